@@ -111,5 +111,4 @@ def test_torch(files):
     arrays = {f"{name}.weight": np.ascontiguousarray(values) for name, values in planes_first().items() if name not in ("apart.pointwise", "up")}
     safetensors.numpy.save_file(arrays, files.folder / "net.safetensors")
     found, rows = used(files.folder / "net.safetensors")
-    assert found == USED
-    assert (rows["depth"], rows["apart.depthwise"]) == (("depthwise", 8), ("depthwise", 16))
+    assert found == USED and (rows["depth"], rows["apart.depthwise"]) == (("depthwise", 8), ("depthwise", 16))

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# fresh_machine.sh RELEASE FOLDER: README's first command and its Python, word for word, from a clone of HEAD in an empty root of RELEASE (bookworm, trixie,
-# noble) that has git and make; then docs/python.md's quick start. Needs root and debootstrap (tools/setup.sh root); takes a quarter of an hour.
+# fresh_machine.sh RELEASE FOLDER: README's first command, its Python and its study, word for word, from a clone of HEAD in an empty root of RELEASE (bookworm,
+# trixie, noble) that has git and make; then docs/python.md's quick start. Needs root and debootstrap (tools/setup.sh root); takes a quarter of an hour.
 set -euo pipefail
 
 readonly RELEASE=$1 ROOT=$2/$1
@@ -38,4 +38,6 @@ in_clone "build/release/stemvo synth drive --frames 12 --width 620 --height 188 
 PYTHONPATH=$SOURCE/tests/python python3 -c "import documented
 print(next(block.text for block in documented.blocks('python') if 'read_recording' in block.text))" >"$ROOT/root/stemvo/quick_start.py"
 in_clone venv/bin/python quick_start.py
+in_clone make lab
+in_clone "$(grep -P '^build/lab/bin/stemvo-lab search ' "$SOURCE/README.md" | sed 's|KITTI|drive|; s|stems/NAME.onnx|default|')"
 echo "==> $RELEASE: done"

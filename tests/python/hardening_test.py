@@ -23,8 +23,7 @@ class TestProgram:
 
     def test_is_read_only_once_it_is_relocated(self):
         for binary in (PROGRAM, MODULE, MARKERS):
-            assert "GNU_RELRO" in readelf("--program-headers", binary)
-            assert re.search(r"FLAGS\)\s+BIND_NOW", readelf("--dynamic", binary))
+            assert "GNU_RELRO" in readelf("--program-headers", binary) and re.search(r"FLAGS\)\s+BIND_NOW", readelf("--dynamic", binary))
 
     def test_no_stack_is_executable(self):
         for binary in (PROGRAM, MODULE, MARKERS):
@@ -32,8 +31,7 @@ class TestProgram:
             assert "E" not in stack.split("GNU_STACK")[1]
 
     def test_starts_without_what_only_videos_need(self):
-        assert "videoio" not in readelf("--dynamic")
-        assert "videoio" in readelf("--dynamic", MODULE)
+        assert "videoio" not in readelf("--dynamic") and "videoio" in readelf("--dynamic", MODULE)
 
     def test_what_only_markers_need_is_no_dependency(self):
         for binary in (PROGRAM, MARKERS):
@@ -41,8 +39,7 @@ class TestProgram:
 
     def test_stack_and_buffers_are_guarded(self):
         symbols = readelf("--dyn-syms")
-        assert "__stack_chk_fail" in symbols
-        assert re.search(r"__\w+_chk@", symbols)
+        assert "__stack_chk_fail" in symbols and re.search(r"__\w+_chk@", symbols)
 
     def test_every_source_is_compiled_with_the_third_level_of_fortify(self):
         """The program itself looks the same with the first."""

@@ -29,8 +29,7 @@ class TestEvaluation:
         done = self.evaluate(poses, poses)
         assert (done.returncode, done.stdout) == (0, f"{poses}: ATE 0.0000 m, RPE 0.0000 m and 0.0000 deg a frame\n"), done.stderr
         refused = self.evaluate(poses, ROOT / "LICENSE")
-        assert (refused.returncode, refused.stdout) == (1, "")
-        assert re.search("^error: .*LICENSE:1: [^\n]+\n$", refused.stderr)
+        assert (refused.returncode, refused.stdout) == (1, "") and re.search("^error: .*LICENSE:1: [^\n]+\n$", refused.stderr)
 
 
 class TestMoved:
@@ -73,8 +72,7 @@ class TestContinuousIntegration:
 
     def test_passes_as_it_is_and_fails_on_a_bound(self):
         names = list(self.commands)
-        assert (names[0], names[-1]) == ("Build", "Check")
-        assert self.commands["Build"].startswith("make build\n")
+        assert (names[0], names[-1]) == ("Build", "Check") and self.commands["Build"].startswith("make build\n")
         for name in names[1:]:
             done = self.run_step(name)
             assert done.returncode == 0, f"{name}: {done.stdout}{done.stderr}"

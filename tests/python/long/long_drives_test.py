@@ -67,8 +67,7 @@ def test_prints_a_row_per_drive_and_goes_on_after_a_failure(tmp_path):
     cells = [cell.strip() for cell in rows[2].strip("|").split("|")]
     assert cells[:2] == ["31", "60"]
     first, second, _ = map(float, cells[6].split("/"))
-    assert min(first, second) > 5.0
-    assert all(float(value) > 0.0 for value in cells[8].split())
+    assert min(first, second) > 5.0 and all(float(value) > 0.0 for value in cells[8].split())
     metrics = json.loads((tmp_path / "out/31/metrics.json").read_text())
     assert cells[3] == f"{metrics['r_rel_deg_per_100m']:.3f}"
 

@@ -128,14 +128,12 @@ class TestPackage:
         camera = self.camera_file("camera.yaml", (620, 188), "distortion_model: none", "camera_height: 1.65")
         tracked = self.run_python(VIDEO, self.folder / "drive/sequences/00/image_2", video, camera, mask)
         call(PROGRAM, "run", video, "--camera", camera, "--mask", mask, "--out", self.folder / "video", "--quiet")
-        assert tracked == (self.folder / "video/trajectory_kitti.txt").read_text()
-        assert tracked.count("\n") == FRAMES
+        assert tracked == (self.folder / "video/trajectory_kitti.txt").read_text() and tracked.count("\n") == FRAMES
 
     def test_the_page(self):
         self.test_a_video()  # which leaves drive.avi and camera.yaml
         said = "".join(self.run_python(block.text) for block in documented.blocks("python"))
-        assert "tracking" in said
-        assert "ate_rmse_m" in said
+        assert "tracking" in said and "ate_rmse_m" in said
 
     def test_the_view_is_where_the_report_is(self):
         self.run_python(FITTED)
@@ -161,15 +159,12 @@ class TestPackage:
         for arguments, text in ((["/nowhere"], "/nowhere/trajectory_kitti.txt"), ([], "expected RESULT"),
                                 (["--live", sequence, "--set", "stem.filtre=1"], "stem.filtre: unknown key")):
             done = self.view(*arguments, "--save", self.folder / "bad.rrd")
-            assert done.returncode != 0
-            assert text in done.stderr
-            assert "Traceback" not in done.stderr
+            assert done.returncode != 0 and text in done.stderr and "Traceback" not in done.stderr
 
     def test_bag(self):
         # bag_test.py reads bags.
         done = subprocess.run([self.python, "-I", "-m", "stemvo.bag", "/nowhere.bag", self.folder / "bag"], capture_output=True, text=True, check=False)
-        assert (done.returncode, done.stdout) == (1, "")
-        assert re.search("^error: /nowhere.bag: [^\n]+\n$", done.stderr)
+        assert (done.returncode, done.stdout) == (1, "") and re.search("^error: /nowhere.bag: [^\n]+\n$", done.stderr)
 
     def test_a_wheel_that_needs_no_library_of_the_system(self):
         wheels = self.folder / "wheels"

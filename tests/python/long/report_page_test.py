@@ -46,8 +46,7 @@ class TestReportPage:
         cls.found = look_at(cls.folder / "result/report.html")
 
     def expect_a_sound_page(self, found):
-        assert found["errors"] == []
-        assert [url for url in found["requests"] if not url.startswith(("file:", "data:", "blob:"))] == []
+        assert found["errors"] == [] and [url for url in found["requests"] if not url.startswith(("file:", "data:", "blob:"))] == []
         assert all(count > 0 for count in found["points"]), found["points"]
         assert all(count > 1 for count in found["log_ticks"]), found["log_ticks"]
         assert all(len(colours) == 1 for colours in found["colours"].values()), found["colours"]
@@ -59,8 +58,7 @@ class TestReportPage:
         assert seen["width"] <= width
         for fault in ("titles_in_the_way", "hard_to_read", "slider_stays", "wrong_colours"):
             assert seen[fault] == [], fault
-        assert set(seen["at_edges_of_spaces"]) - {0} == set()
-        assert seen.get("buttons_over_legend", 0) == 0
+        assert set(seen["at_edges_of_spaces"]) - {0} == set() and seen.get("buttons_over_legend", 0) == 0
         assert all(moved > 20 for moved in seen.get("swiped", [])), seen
         assert all(seen["labels"].values()), seen["labels"]
         for heading in ("Path from above", "Path in space"):
@@ -76,14 +74,11 @@ class TestReportPage:
         call("run", images, "--camera", self.folder / "camera.yaml", "--out", self.folder / "plain_result", "--quiet")
         found = look_at(self.folder / "plain_result/report.html")
         self.expect_a_sound_page(found)
-        assert "Path from above" in found["headings"]
-        assert "Error over distance" not in found["headings"]
-        assert "Command" in found["headings"]
+        assert "Path from above" in found["headings"] and "Error over distance" not in found["headings"] and "Command" in found["headings"]
 
     def test_draws_everything_without_errors_or_a_network(self):
         self.expect_a_sound_page(self.found)
-        assert f"frames 0:{FRAMES} of 00" in self.found["title"]
-        assert self.found["figures"] == 7
+        assert f"frames 0:{FRAMES} of 00" in self.found["title"] and self.found["figures"] == 7
         assert len(self.found["images"]) == 7  # one under the slider
         assert all(width > 100 for width in self.found["images"])
         for caption in self.found["captions"]:
@@ -123,5 +118,4 @@ class TestReportPage:
         assert re.search(f"frame {FRAMES // 2}: [a-z_]+.* m off", self.found["hover"])
         assert self.found["hover"] == self.found["by_hover"].replace(", ", "")
         (left, right), (zoomed_left, zoomed_right) = self.found["zoom"]
-        assert zoomed_right - zoomed_left < 0.9 * (right - left)
-        assert self.found["scrolled_over_a_chart"] > 50
+        assert zoomed_right - zoomed_left < 0.9 * (right - left) and self.found["scrolled_over_a_chart"] > 50
