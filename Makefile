@@ -53,7 +53,7 @@ test-all: test test-long
 # Without one of these groups the tests that need it are skipped.
 test-long:
 	@for group in peers browser root; do tools/setup.sh $$group || echo "==> Without $$group"; done
-	@tools/setup.sh lab tex docs
+	@tools/setup.sh tex docs
 	@echo "==> Running the long tests"
 	@ctest --preset long --parallel $(JOBS); failed=$$?; tools/skipped.sh; exit $$failed
 
