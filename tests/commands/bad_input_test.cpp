@@ -5,16 +5,11 @@
 namespace stemvo {
 namespace {
 
-/// A copy of ten rendered frames that each test breaks in its own way.
-class BadInput : public ::testing::Test {
+class BadInput : public DriveCopy {
  protected:
   ProgramResult run(const Words& more = {}) const {
     return run_stemvo({"run", sequence_.string(), "--out", out_}, more);
   }
-
-  TempFolder folder_;
-  fs::path sequence_ = copy_drive(folder_.path(), 10);
-  std::string out_ = folder_ / "out";
 };
 
 TEST_F(BadInput, WhatIsNoModelIsNamed) {

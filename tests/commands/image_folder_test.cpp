@@ -19,7 +19,7 @@ std::string first_ten_lines(const fs::path& file) {
 }
 
 /// Ten rendered frames as a folder of images; each test breaks them in its own way.
-class ImageFolderRun : public ::testing::Test {
+class ImageFolderRun : public DriveCopy {
  protected:
   void SetUp() override {
     fs::rename(sequence_ / "image_2", images_);
@@ -38,11 +38,8 @@ class ImageFolderRun : public ::testing::Test {
     return text.substr(begin, text.find('\n', begin) - begin);
   }
 
-  TempFolder folder_;
-  const fs::path sequence_ = copy_drive(folder_.path(), 10);
   const fs::path images_ = folder_.path() / "my images";
   const std::string camera_ = folder_ / "camera.yaml";
-  const std::string out_ = folder_ / "out";
   const std::string good_camera_ = camera_file_of(sequence_) + "rate_hz: 10\n";
 };
 

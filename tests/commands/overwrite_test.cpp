@@ -5,13 +5,7 @@
 namespace stemvo {
 namespace {
 
-/// A copy of ten rendered frames, which no command writes over.
-class Overwrite : public ::testing::Test {
- protected:
-  TempFolder folder_;
-  fs::path sequence_ = copy_drive(folder_.path(), 10);
-  std::string out_ = folder_ / "out";
-};
+class Overwrite : public DriveCopy {};
 
 TEST_F(Overwrite, CalibrateSparesWhatItReads) {
   write_file(folder_ / "my.yaml", "seed: 1\n");

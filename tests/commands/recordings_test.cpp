@@ -14,8 +14,9 @@ namespace {
 constexpr int kNumFrames = 12;
 
 /// One rendered drive as others record: its images, times and camera in their layouts.
-class RecordingsRun : public ::testing::Test {
+class RecordingsRun : public DriveCopy {
  protected:
+  RecordingsRun() : DriveCopy(kNumFrames) {}
   void SetUp() override { write_file(camera_, camera_file_of(sequence_)); }
 
   fs::path image(int index) const { return sequence_ / fmt::format("image_2/{:06}.png", index); }
@@ -42,10 +43,7 @@ class RecordingsRun : public ::testing::Test {
     return file;
   }
 
-  TempFolder folder_;
-  const fs::path sequence_ = copy_drive(folder_.path(), kNumFrames);
   const std::string camera_ = folder_ / "camera.yaml";
-  const std::string out_ = folder_ / "out";
 };
 
 TEST_F(RecordingsRun, Euroc) {

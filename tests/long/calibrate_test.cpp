@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "dataset/kitti_text.hpp"
 #include "support/program_test.hpp"
 #include "support/shared_data.hpp"
 #include "support/state_runs.hpp"
@@ -7,30 +8,11 @@
 namespace stemvo {
 namespace {
 
-struct Intrinsics {
-  double f = 0.0;
-  double cx = 0.0;
-  double cy = 0.0;
-};
+Camera read_camera(const fs::path& file) { return dataset::read_kitti_camera(file, 2).value(); }
 
-Intrinsics read_intrinsics(const fs::path& file) {
-  Intrinsics result;
-  const std::string text = read_file(file);
-  const std::size_t at = text.find("P2:");
-  double zero = 0.0;
-  double fy = 0.0;
-  const int read = at == std::string::npos
-                       ? 0
-                       : std::sscanf(text.c_str() + at, "P2: %lf %lf %lf %lf %lf %lf %lf",
-                                     &result.f, &zero, &result.cx, &zero, &zero, &fy, &result.cy);
-  EXPECT_EQ(read, 7) << file;
-  EXPECT_EQ(result.f, fy);
-  return result;
-}
-
-void write_intrinsics(const fs::path& file, const Intrinsics& k) {
-  write_file(file, fmt::format("P2: {0:.12e} 0 {1:.12e} 0 0 {0:.12e} {2:.12e} 0 0 0 1 0\n", k.f,
-                               k.cx, k.cy));
+void write_camera(const fs::path& file, double f, double cx, double cy) {
+  write_file(file,
+             fmt::format("P2: {0:.12e} 0 {1:.12e} 0 0 {0:.12e} {2:.12e} 0 0 0 1 0\n", f, cx, cy));
 }
 
 class Calibrate : public ::testing::Test {
@@ -47,14 +29,15 @@ class Calibrate : public ::testing::Test {
 // The images show no distortion, so that what is found is the camera that rendered them.
 TEST_F(Calibrate, FindsTheCameraThatRenderedTheWalk) {
   sequence_ = render_walk_once(300) / "sequences/00";
-  const Intrinsics truth = read_intrinsics(sequence_ / "calib.txt");
+  const Camera truth = read_camera(sequence_ / "calib.txt");
   const std::string wrong = folder_ / "wrong.txt";
-  write_intrinsics(wrong, {1.03 * truth.f, truth.cx + 4.0, truth.cy - 3.0});
+  write_camera(wrong, 1.03 * truth.fx_px, truth.cx_px + 4.0, truth.cy_px - 3.0);
   const ProgramResult result = succeeded(calibrate({"--calib", wrong}));
-  const Intrinsics found = read_intrinsics(out_);
-  EXPECT_NEAR(found.f / truth.f, 1.0, 0.006);
-  EXPECT_NEAR(found.cx, truth.cx, 1.0);
-  EXPECT_NEAR(found.cy, truth.cy, 1.0);
+  const Camera found = read_camera(out_);
+  EXPECT_NEAR(found.fx_px / truth.fx_px, 1.0, 0.006);
+  EXPECT_EQ(found.fx_px, found.fy_px);
+  EXPECT_NEAR(found.cx_px, truth.cx_px, 1.0);
+  EXPECT_NEAR(found.cy_px, truth.cy_px, 1.0);
   EXPECT_THAT(result.out, AllOf(HasSubstr("focal length"), HasSubstr("sigma"), HasSubstr("k1"),
                                 HasSubstr(out_)));
   EXPECT_THAT(result.err, HasSubstr("300/300 frames"));
@@ -64,8 +47,8 @@ TEST_F(Calibrate, FindsTheCameraThatRenderedTheWalk) {
 TEST_F(Calibrate, ARunUsesTheFileItIsGivenAndNoOther) {
   const fs::path copy = copy_drive(folder_.path(), 12);
   const std::string wrong = folder_ / "wrong.txt";
-  const Intrinsics truth = read_intrinsics(copy / "calib.txt");
-  write_intrinsics(wrong, {1.1 * truth.f, truth.cx, truth.cy});
+  const Camera truth = read_camera(copy / "calib.txt");
+  write_camera(wrong, 1.1 * truth.fx_px, truth.cx_px, truth.cy_px);
   const auto run = [&](const std::string& out, const Words& more) {
     succeeded(run_stemvo({"run", copy.string(), "--out", folder_ / out, "--quiet"}, more));
     return read_file(folder_ / (out + "/trajectory_kitti.txt"));
@@ -101,11 +84,11 @@ TEST_F(Calibrate, WhatIsWrongIsSaid) {
   expect_error(calibrate({"--frames", "0:2", "--quiet"}), {sequence_.string(), "2 frames"});
   expect_error(calibrate({"--calib", folder_ / "none.txt"}), {"none.txt"});
   const std::string other = folder_ / "other.txt";
-  write_intrinsics(other, {1000.0, 2000.0, 100.0});
+  write_camera(other, 1000.0, 2000.0, 100.0);
   expect_error(calibrate({"--calib", other}), {"other.txt", "620x188", "2000"});
   expect_error(run_stemvo({"run", sequence_.string(), "--out", folder_ / "o", "--calib", other}),
                {"other.txt", "620x188"});
-  write_intrinsics(out_, read_intrinsics(sequence_ / "calib.txt"));
+  fs::copy_file(sequence_ / "calib.txt", out_);
   expect_error(calibrate({"--calib", out_}), {out_, "no input"});
   fs::remove(out_);
   expect_error(run_stemvo({"calibrate", folder_ / "none", "--out", out_}), {folder_ / "none"});

@@ -23,6 +23,16 @@ inline std::string camera_file_of(const fs::path& sequence) {
                      words.at(7));
 }
 
+/// A copy of rendered frames that each test breaks in its own way, and a folder for results.
+class DriveCopy : public ::testing::Test {
+ protected:
+  explicit DriveCopy(int num_frames = 10) : sequence_(copy_drive(folder_.path(), num_frames)) {}
+
+  TempFolder folder_;
+  const fs::path sequence_;
+  const std::string out_ = folder_ / "out";
+};
+
 /// One line, with the words given, and the exit code; nothing on standard output.
 inline void expect_error(const ProgramResult& result, int exit_code, const Words& words) {
   EXPECT_EQ(result.exit_code, exit_code) << result.err;

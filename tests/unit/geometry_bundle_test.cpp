@@ -209,9 +209,11 @@ TEST(Bundle, FixedPointsStayAndHoldTheScale) {
   for (Rigid3& pose : bundle.camera_from_world) {
     pose.translation *= 1.02;  // the first one is at the origin
   }
-  EXPECT_TRUE(solve_bundle_adjustment(
-                  bundle, {.num_fixed_poses = 1, .max_iterations = 30, .min_relative_decrease = 0})
-                  .is_usable);
+  BundleOptions options;
+  options.num_fixed_poses = 1;
+  options.max_iterations = 30;
+  options.min_relative_decrease = 0.0;
+  EXPECT_TRUE(solve_bundle_adjustment(bundle, options).is_usable);
   for (std::size_t i = 0; i < 100; ++i) {
     EXPECT_EQ(bundle.points[i], truth[i]);
   }

@@ -59,49 +59,51 @@ void walk_runs(const Camera& true_camera, SelfCalibration& calibration) {
   }
 }
 
-TEST(SelfCalibration, FindsAPrincipalPointThatIsWrong) {
-  const Camera truth = kitti_camera();
-  Camera given = truth;
-  given.cx_px += 3.0;
-  given.cy_px -= 2.0;
-  SelfCalibration calibration(given, CameraRefinement::kPrincipalPoint);
-  drive_runs(truth, calibration);
-  EXPECT_NEAR(calibration.camera().cx_px, truth.cx_px, 0.5);
-  EXPECT_NEAR(calibration.camera().cy_px, truth.cy_px, 0.5);
-  EXPECT_EQ(calibration.camera().fx_px, given.fx_px);
+class SelfCalibrationTest : public ::testing::Test {
+ protected:
+  const Camera truth_ = kitti_camera();
+  Camera given_ = truth_;
+};
+
+TEST_F(SelfCalibrationTest, FindsAPrincipalPointThatIsWrong) {
+  given_.cx_px += 3.0;
+  given_.cy_px -= 2.0;
+  SelfCalibration calibration(given_, CameraRefinement::kPrincipalPoint);
+  drive_runs(truth_, calibration);
+  EXPECT_NEAR(calibration.camera().cx_px, truth_.cx_px, 0.5);
+  EXPECT_NEAR(calibration.camera().cy_px, truth_.cy_px, 0.5);
+  EXPECT_EQ(calibration.camera().fx_px, given_.fx_px);
   const CameraSigma sigma = *calibration.camera_sigma();
   EXPECT_LE(sigma.cy_px, 0.5);
   EXPECT_LT(sigma.cx_px, 0.9 * sigma.cy_px) << "the drive turns more than it pitches";
-  EXPECT_LT(sigma.fx_px, 0.5 * 3.0 * 0.003 * given.fx_px) << "estimated, though not applied";
+  EXPECT_LT(sigma.fx_px, 0.5 * 3.0 * 0.003 * given_.fx_px) << "estimated, though not applied";
 }
 
-TEST(SelfCalibration, FindsAFocalLengthThatIsWrongWithinItsSigma) {
-  const Camera truth = kitti_camera();
+TEST_F(SelfCalibrationTest, FindsAFocalLengthThatIsWrongWithinItsSigma) {
   for (const double share : {0.97, 1.03}) {
-    Camera given = truth;
-    given.fx_px *= share;
-    given.fy_px *= share;
-    SelfCalibration calibration(given, CameraRefinement::kAll);
-    walk_runs(truth, calibration);
+    given_ = truth_;
+    given_.fx_px *= share;
+    given_.fy_px *= share;
+    SelfCalibration calibration(given_, CameraRefinement::kAll);
+    walk_runs(truth_, calibration);
     const double sigma_px = calibration.camera_sigma()->fx_px;
-    EXPECT_LT(sigma_px, 0.01 * truth.fx_px);
-    EXPECT_LT(std::abs(calibration.camera().fx_px - truth.fx_px), 2.0 * sigma_px);
-    EXPECT_NEAR(calibration.camera().fy_px / truth.fy_px, calibration.camera().fx_px / truth.fx_px,
-                1e-12);
+    EXPECT_LT(sigma_px, 0.01 * truth_.fx_px);
+    EXPECT_LT(std::abs(calibration.camera().fx_px - truth_.fx_px), 2.0 * sigma_px);
+    EXPECT_NEAR(calibration.camera().fy_px / truth_.fy_px,
+                calibration.camera().fx_px / truth_.fx_px, 1e-12);
   }
 }
 
 /// Errors of a real track are alike, so sigmas are far from what independent ones, as here, make:
 /// they are doubled, and robust weights and the error before the solve do the rest.
-TEST(SelfCalibration, IndependentErrorsAreFarWithinTheSigma) {
+TEST_F(SelfCalibrationTest, IndependentErrorsAreFarWithinTheSigma) {
   constexpr int kNumDrives = 12;
-  const Camera truth = kitti_camera();
   double sum_sq = 0.0;
   for (int k = 0; k < kNumDrives; ++k) {
-    SelfCalibration calibration(truth, CameraRefinement::kPrincipalPoint);
+    SelfCalibration calibration(truth_, CameraRefinement::kPrincipalPoint);
     const auto turn = [](int i) { return Eigen::Vector3d(0.004 * (i % 3 - 1), 0.05, 0.0); };
     observe_run(k, turn, {0.0, 0.0, 0.9}, DriveTracks(2, 0.0, static_cast<std::uint64_t>(k)).points,
-                truth, calibration);
+                truth_, calibration);
     const CameraEstimate estimate = *calibration.estimate();
     sum_sq += estimate.change.cwiseQuotient(estimate.sigma).head<2>().squaredNorm();
   }
@@ -112,48 +114,43 @@ TEST(SelfCalibration, IndependentErrorsAreFarWithinTheSigma) {
 }
 
 /// Which a drive does not tell: the sigma says so.
-TEST(SelfCalibration, AFocalLengthThatIsNotToldStaysWithinItsSigma) {
-  const Camera truth = kitti_camera();
-  Camera given = truth;
-  given.fx_px *= 1.03;
-  given.fy_px *= 1.03;
-  SelfCalibration calibration(given, CameraRefinement::kAll);
-  drive_runs(truth, calibration);
-  EXPECT_EQ(calibration.camera().fx_px, given.fx_px);
-  EXPECT_LT(given.fx_px - truth.fx_px, 2.0 * calibration.camera_sigma()->fx_px);
+TEST_F(SelfCalibrationTest, AFocalLengthThatIsNotToldStaysWithinItsSigma) {
+  given_.fx_px *= 1.03;
+  given_.fy_px *= 1.03;
+  SelfCalibration calibration(given_, CameraRefinement::kAll);
+  drive_runs(truth_, calibration);
+  EXPECT_EQ(calibration.camera().fx_px, given_.fx_px);
+  EXPECT_LT(given_.fx_px - truth_.fx_px, 2.0 * calibration.camera_sigma()->fx_px);
 }
 
-TEST(SelfCalibration, ARightCameraIsKept) {
-  const Camera truth = kitti_camera();
-  SelfCalibration calibration(truth, CameraRefinement::kAll);
-  drive_runs(truth, calibration);
+TEST_F(SelfCalibrationTest, ARightCameraIsKept) {
+  SelfCalibration calibration(truth_, CameraRefinement::kAll);
+  drive_runs(truth_, calibration);
   EXPECT_EQ(calibration.estimate()->num_bundles, kNumRuns);
-  EXPECT_EQ(calibration.camera().cx_px, truth.cx_px);
-  EXPECT_EQ(calibration.camera().cy_px, truth.cy_px);
-  EXPECT_EQ(calibration.camera().fx_px, truth.fx_px);
+  EXPECT_EQ(calibration.camera().cx_px, truth_.cx_px);
+  EXPECT_EQ(calibration.camera().cy_px, truth_.cy_px);
+  EXPECT_EQ(calibration.camera().fx_px, truth_.fx_px);
 }
 
 /// However sure its runs are: as much is missed where all turns are to one side.
-TEST(SelfCalibration, ACameraThatIsHalfAPixelOffIsKept) {
-  const Camera truth = kitti_camera();
-  Camera given = truth;
-  given.cx_px += 0.5;
-  SelfCalibration calibration(given, CameraRefinement::kPrincipalPoint);
-  drive_runs(truth, calibration);
+TEST_F(SelfCalibrationTest, ACameraThatIsHalfAPixelOffIsKept) {
+  given_.cx_px += 0.5;
+  SelfCalibration calibration(given_, CameraRefinement::kPrincipalPoint);
+  drive_runs(truth_, calibration);
   const CameraEstimate estimate = *calibration.estimate();
   EXPECT_GT(std::abs(estimate.change[0]), 2.0 * estimate.sigma[0]);  // told for certain
-  EXPECT_EQ(calibration.camera().cx_px, given.cx_px);
+  EXPECT_EQ(calibration.camera().cx_px, given_.cx_px);
 }
 
 /// Drives miss it by more than their runs' sigmas.
-TEST(SelfCalibration, TheSigmaOfAFocalLengthIsThreeTimesWhatTheInformationSays) {
+TEST_F(SelfCalibrationTest, TheSigmaOfAFocalLengthIsThreeTimesWhatTheInformationSays) {
   const SelfCalibration calibration(kitti_camera(), CameraRefinement::kAll);
   EXPECT_NEAR(calibration.estimate()->sigma[2], 3.0 * 0.03, 1e-12);  // of the prior
   EXPECT_NEAR(calibration.estimate()->sigma[0], 30.0, 1e-9);
   EXPECT_NEAR(calibration.camera_sigma()->fx_px, 3.0 * 0.03 * kitti_camera().fx_px, 1e-9);
 }
 
-TEST(SelfCalibration, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
+TEST_F(SelfCalibrationTest, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
   const DriveTracks drive(kLength, 0.1, 5);
   const auto keyframe_of = [&](int i, double unit) {
     Keyframe keyframe{i, drive.pose(i), {}};
@@ -182,13 +179,11 @@ TEST(SelfCalibration, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
   EXPECT_LT((rescaled.estimate()->change - plain.estimate()->change).norm(), 0.01);
 }
 
-TEST(SelfCalibration, OffMeansOff) {
-  const Camera truth = kitti_camera();
-  Camera given = truth;
-  given.cx_px += 3.0;
-  SelfCalibration calibration(given, CameraRefinement::kOff);
-  drive_runs(truth, calibration);
-  EXPECT_EQ(calibration.camera().cx_px, given.cx_px);
+TEST_F(SelfCalibrationTest, OffMeansOff) {
+  given_.cx_px += 3.0;
+  SelfCalibration calibration(given_, CameraRefinement::kOff);
+  drive_runs(truth_, calibration);
+  EXPECT_EQ(calibration.camera().cx_px, given_.cx_px);
   EXPECT_FALSE(calibration.camera_sigma().has_value());
 }
 

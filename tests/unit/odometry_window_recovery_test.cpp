@@ -24,8 +24,8 @@ struct WellDriven : Driven {
     return 1.0 / length_ratio(estimator.trajectory(), drive.world_from_camera, 0, kBadFrame - 1);
   }
   [[nodiscard]] bool keeps_map() const {
-    const auto& keyframes = estimator.window().keyframes;
-    return !keyframes.empty() && keyframes.front().frame < kBadFrame - 1;
+    const auto& kept = estimator.window().keyframes;
+    return !kept.empty() && kept.front().frame < kBadFrame - 1;
   }
   /// The step to the last frame fed, against that of the drive from `before` to `i`.
   void expect_true_step(int before, int i) const {

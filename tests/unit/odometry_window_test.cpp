@@ -145,7 +145,7 @@ TEST(Window, KnownLandmarksAreFixedWhereTheyAreSeenAndNoAdjustmentMovesThem) {
   Window other = window_of(drive, {});
   fix_landmarks(other, drive.camera, wrong, 2.0);
   EXPECT_TRUE(other.fixed.empty());
-  EXPECT_TRUE(refine_window(window, drive.camera, {.num_fixed_poses = 1}));
+  EXPECT_TRUE(refine_window(window, drive.camera, {.num_fixed_poses = 1, .camera = std::nullopt}));
   for (const int id : window.fixed) {
     EXPECT_EQ(window.landmarks.at(id), known.at(id));
   }
