@@ -5,21 +5,21 @@ import numpy as np
 import onnx
 import onnxruntime
 import pytest
-from exporting import files, run_onnx  # noqa: F401
+from exporting import files, run_onnx, save_network  # noqa: F401
 from onnx import TensorProto, helper, numpy_helper
 from stemvo.stems import receptive_field
 
 IMAGE, NONE = np.random.default_rng(2).uniform(0, 255, (3, 64, 96)), ("--preprocessing", "none")
 
 
-def network(path, *, colours_last=False, free=True, same=b"SAME_UPPER", image="x"):
+def network(path, *, colours_last=False, image="x"):
     """Convolution 5x5/2 "same", squeeze and excitation, depthwise 3x3, padded pool, a dense layer."""
     rng = np.random.default_rng(11)
-    constants = [numpy_helper.from_array(rng.normal(size=shape).astype(np.float32), name) for name, shape in
-                 (("w1", (6, 3, 5, 5)), ("w2", (6, 1, 3, 3)), ("squeeze", (6, 6, 1, 1)), ("dense", (6, 4)))]
+    shapes = {"w1": (6, 3, 5, 5), "w2": (6, 1, 3, 3), "squeeze": (6, 6, 1, 1), "dense": (6, 4)}
+    constants = {name: rng.normal(size=shape).astype(np.float32) for name, shape in shapes.items()}
     nodes = [helper.make_node("Transpose", [image], ["planes"], perm=[0, 3, 1, 2])] if colours_last else []
     nodes += [helper.make_node("Conv", ["planes" if colours_last else image, "w1"], ["front"], name="conv_1", kernel_shape=[5, 5],
-                               strides=[2, 2], auto_pad=same),
+                               strides=[2, 2], auto_pad="SAME_UPPER"),
               helper.make_node("Relu", ["front"], ["front/relu"]),
               helper.make_node("MaxPool", ["front/relu"], ["pooled"], kernel_shape=[3, 3], strides=[2, 2], pads=[1, 1, 1, 1]),
               helper.make_node("GlobalAveragePool", ["pooled"], ["average"]),
@@ -30,31 +30,18 @@ def network(path, *, colours_last=False, free=True, same=b"SAME_UPPER", image="x
               helper.make_node("Transpose", ["second"], ["last"], perm=[0, 2, 3, 1]),
               helper.make_node("ReduceMean", ["last"], ["mean"], axes=[1, 2], keepdims=0),
               helper.make_node("MatMul", ["mean", "dense"], ["y"])]
-    sides = ["H", "W"] if free else [32, 48]
-    shape = [1, *sides, 3] if colours_last else [1, 3, *sides]
-    graph = helper.make_graph(nodes, "network", [helper.make_tensor_value_info(image, TensorProto.FLOAT, shape)],
-                              [helper.make_tensor_value_info("y", TensorProto.FLOAT, [1, 4])], constants)
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)])
-    model.ir_version = 8
-    onnx.checker.check_model(model)
-    onnx.save(model, path)
-    return model
+    return save_network(path, nodes, {image: [1, "H", "W", 3] if colours_last else [1, 3, "H", "W"]}, {"y": [1, 4]}, constants)
 
 
 def with_computed_weights(path, kind, operators):
     """Convolution 5x5/2 whose weights the nodes (operator, inputs, output, attributes) compute from `w`, up to `computed`."""
     rng = np.random.default_rng(5)
     weights = rng.integers(-99, 99, (6, 3, 5, 5)).astype(kind)
-    constants = [numpy_helper.from_array(values, name) for name, values in
-                 (("w", weights), ("scale", rng.uniform(0.01, 0.1, 6).astype(np.float32)), ("three", np.full(3, 2, np.float32)),
-                  ("axes", np.array([1, 2, 3]))) if any(name in inputs for _, inputs, _, _ in operators)]
+    constants = {"w": weights, "scale": rng.uniform(0.01, 0.1, 6).astype(np.float32), "three": np.full(3, 2, np.float32), "axes": np.array([1, 2, 3])}
+    constants = {name: values for name, values in constants.items() if any(name in inputs for _, inputs, _, _ in operators)}
     nodes = [helper.make_node(operator, inputs, [output], **more) for operator, inputs, output, more in operators]
     nodes.append(helper.make_node("Conv", ["x", "computed"], ["front"], kernel_shape=[5, 5], strides=[2, 2], pads=[1, 1, 2, 2]))
-    value = lambda name, shape: helper.make_tensor_value_info(name, TensorProto.FLOAT, shape)  # noqa: E731
-    graph = helper.make_graph(nodes, "computed", [value("x", [1, 3, "H", "W"])], [value("front", [1, 6, None, None])], constants)
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18), helper.make_opsetid("theirs", 1)], ir_version=8)
-    onnx.save(model, path)
-    return model
+    return save_network(path, nodes, {"x": [1, 3, "H", "W"]}, {"front": [1, 6, None, None]}, constants, (("", 18), ("theirs", 1)))
 
 
 def uncut(model, tensor, image, colours_last):
@@ -124,17 +111,13 @@ def test_a_network_of_one_size_is_refused(files, path):
 def test_paddings_that_nodes_compute_from_the_size(files, path):
     """As timm writes TensorFlow's: Shape, arithmetic, Pad."""
     rng = np.random.default_rng(11)
-    constants = [numpy_helper.from_array(values, name) for name, values in
-                 (("w", rng.normal(size=(6, 3, 3, 3)).astype(np.float32)), ("sides", np.array([2, 3])), ("two", np.array([2, 2])),
-                  ("planes", np.zeros(2, np.int64)), ("one", np.array([1, 1])))]
+    constants = {"w": rng.normal(size=(6, 3, 3, 3)).astype(np.float32), "sides": np.array([2, 3]), "two": np.array([2, 2]), "planes": np.zeros(2, np.int64),
+                 "one": np.array([1, 1])}
     nodes = [helper.make_node("Shape", ["x"], ["shape"]), helper.make_node("Gather", ["shape", "sides"], ["size"]),
              helper.make_node("Mod", ["size", "two"], ["odd"]),  # "same", 3x3/2
              helper.make_node("Concat", ["planes", "odd", "planes", "one"], ["pads"], axis=0), helper.make_node("Pad", ["x", "pads"], ["padded"]),
              helper.make_node("Conv", ["padded", "w"], ["front"], kernel_shape=[3, 3], strides=[2, 2])]
-    value = lambda name, shape: helper.make_tensor_value_info(name, TensorProto.FLOAT, shape)  # noqa: E731
-    graph = helper.make_graph(nodes, "timm", [value("x", [1, 3, "H", "W"])], [value("front", [1, 6, None, None])], constants)
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
-    onnx.save(model, path)
+    model = save_network(path, nodes, {"x": [1, 3, "H", "W"]}, {"front": [1, 6, None, None]}, constants)
     assert compare(files, model, "front", "--layers", "front")["padding"] == [0, 0, 1, 1]
 
 
@@ -163,23 +146,20 @@ def test_errors(files, path, options, words):
     assert words in files.error_of(path, *options)
 
 
-def test_equals_where_a_gradient_is_not_zero():
+def test_equals_where_a_gradient_is_not_zero(tmp_path):
     """A chain of random windows with all-positive weights: the pixels that change an output are its window."""
     rng = np.random.default_rng(4)
     for _ in range(20):
-        nodes, constants, last = [], [], "image"
+        nodes, constants, last = [], {}, "image"
         for step in range(3):
             size, stride = int(rng.integers(1, 5)), int(rng.integers(1, 3))
             pads = [int(value) for value in rng.integers(0, size, 4)]
-            constants.append(numpy_helper.from_array(np.ones((1, 1, size, size), np.float32), f"w{step}"))
+            constants[f"w{step}"] = np.ones((1, 1, size, size), np.float32)
             nodes.append(helper.make_node("Conv", [last, f"w{step}"], [f"t{step}"], kernel_shape=[size, size],
                                           strides=[stride, stride], pads=pads))
             last = f"t{step}"
-        value = lambda name: helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, 1, None, None])  # noqa: E731
-        graph = helper.make_graph(nodes, "chain", [value("image")], [value(last)], constants)
-        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)])
-        model.ir_version = 8
-        field = receptive_field.Walk(graph, "image").fields[last]
+        model = save_network(tmp_path / "chain.onnx", nodes, {"image": [1, 1, None, None]}, {last: [1, 1, None, None]}, constants)
+        field = receptive_field.Walk(model.graph, "image").fields[last]
         session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
         height, width = 61, 70
         zero = session.run(None, {"image": np.zeros((1, 1, height, width), np.float32)})[0]

@@ -10,6 +10,7 @@ import zipfile
 
 import h5py
 import numpy as np
+import onnx
 import onnxruntime
 import pytest
 from click.testing import CliRunner
@@ -27,6 +28,15 @@ def written(text):
         entries.append(said | {key: list(map(int, said[key].split())) for key in ("kernel", "padding")} |
                        {key: int(said[key]) for key in ("filters", "stride", "default_filter")} | {"file": pathlib.Path(path).name})
     return entries
+
+
+def save_network(path, nodes, inputs, outputs, constants, opsets=(("", 13),)):
+    """inputs, outputs: name -> shape, of floats; constants: name -> array."""
+    values = [[onnx.helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, shape) for name, shape in given.items()] for given in (inputs, outputs)]
+    graph = onnx.helper.make_graph(nodes, "network", *values, [onnx.numpy_helper.from_array(array, name) for name, array in constants.items()])
+    model = onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid(*one) for one in opsets], ir_version=8)
+    onnx.save(model, path)
+    return model
 
 
 def run_onnx(path, image):

@@ -6,11 +6,10 @@ import json
 import exporting
 import h5py
 import numpy as np
-import onnx
 import pytest
 import safetensors.numpy
 from exporting import files  # noqa: F401
-from onnx import TensorProto, helper, numpy_helper
+from onnx import helper, numpy_helper
 from stemvo.stems import keras_files, layer_list
 
 # Name, class in Keras, filters of its output; used are the plain ones, "grouped" too, which Keras knows as Conv2D.
@@ -39,10 +38,10 @@ def planes_first():
 
 
 def graph(path, with_constants=True):
-    nodes, constants, last = [], [], "x"
+    nodes, constants, last = [], {}, "x"
     groups = {"depth": 8, "grouped": 4, "apart.depthwise": 16}
     for name, values in planes_first().items():
-        constants.append(numpy_helper.from_array(values, f"{name}.weight"))
+        constants[f"{name}.weight"] = values
         if name == "up":  # planes, filters
             nodes.append(helper.make_node("ConvTranspose", [last, f"{name}.weight"], [name], kernel_shape=[2, 2], strides=[2, 2]))
         else:
@@ -53,15 +52,9 @@ def graph(path, with_constants=True):
         if name in ("first", "depth", "plain", "grouped"):  # a network has something between them; not inside a separable one
             nodes.append(helper.make_node("Relu", [last], [f"{name}.relu"]))
             last = f"{name}.relu"
-    inputs = [helper.make_tensor_value_info("x", TensorProto.FLOAT, [1, 3, "H", "W"])]
-    outputs = [helper.make_tensor_value_info(last, TensorProto.FLOAT, [1, 5, None, None])]
     if not with_constants:
-        nodes = [helper.make_node("Constant", [], [item.name], value=item) for item in constants] + nodes
-        constants = []
-    model = helper.make_model(helper.make_graph(nodes, "network", inputs, outputs, constants), opset_imports=[helper.make_opsetid("", 13)])
-    model.ir_version = 8
-    onnx.checker.check_model(model)
-    onnx.save(model, path)
+        nodes = [helper.make_node("Constant", [], [name], value=numpy_helper.from_array(values, name)) for name, values in constants.items()] + nodes
+    exporting.save_network(path, nodes, {"x": [1, 3, "H", "W"]}, {last: [1, 5, None, None]}, constants if with_constants else {})
 
 
 def used(path):

@@ -12,6 +12,7 @@ import onnx
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from exporting import save_network
 from small_kitti import write_sequence
 from stemvo.lab import paper
 from stemvo.lab.cli import main
@@ -73,13 +74,10 @@ def test_figures(made):
 
 
 def test_all_layers_of_a_network(tmp_path):
-    random, nodes, weights = np.random.default_rng(1), [], []
-    for number, (inputs, filters) in enumerate(((3, 4), (4, 6))):
-        weights.append(onnx.numpy_helper.from_array(random.standard_normal((filters, inputs, 3, 3)).astype(np.float32), f"w{number}"))
-        nodes.append(onnx.helper.make_node("Conv", ["x" if number == 0 else "y0", f"w{number}"], [f"y{number}"], strides=[2, 2], pads=[1, 1, 1, 1]))
-    graph = onnx.helper.make_graph(nodes, "two", [onnx.helper.make_tensor_value_info("x", 1, [1, 3, "h", "w"])],
-                                   [onnx.helper.make_tensor_value_info("y1", 1, [1, 6, "a", "b"])], weights)
-    onnx.save(onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=8), tmp_path / "two.onnx")
+    random = np.random.default_rng(1)
+    weights = {f"w{i}": random.standard_normal(shape).astype(np.float32) for i, shape in enumerate(((4, 3, 3, 3), (6, 4, 3, 3)))}
+    nodes = [onnx.helper.make_node("Conv", [name, f"w{i}"], [f"y{i}"], strides=[2, 2], pads=[1, 1, 1, 1]) for i, name in enumerate(("x", "y0"))]
+    save_network(tmp_path / "two.onnx", nodes, {"x": [1, 3, "h", "w"]}, {"y1": [1, 6, "a", "b"]}, weights)
     layers, totals = paper.export(tmp_path / "two.onnx", "all", tmp_path, "unit")
     assert totals == (2, 10, 10, 0) and [(layer.name, layer.filters, layer.stride_px) for layer in layers] == [("y0", 4, 2), ("y1", 6, 4)]
 
