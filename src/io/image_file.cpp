@@ -177,8 +177,7 @@ std::string encode_jpeg(const cv::Mat& image, int quality) {
                   TJFLAG_NOREALLOC) != 0) {
     throw std::bad_alloc();  // nothing else can fail
   }
-  bytes.resize(size);
-  return bytes;
+  return bytes.substr(0, size);  // the buffer is far longer
 }
 
 }  // namespace stemvo::io

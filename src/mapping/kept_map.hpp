@@ -17,6 +17,9 @@
 
 namespace stemvo {
 
+/// A number of a keyframe, or of a corner, as an index.
+[[nodiscard]] constexpr std::size_t slot(int number) { return static_cast<std::size_t>(number); }
+
 /// 256 comparisons of the channel around a corner, one bit each.
 using Descriptor = std::array<std::uint64_t, 4>;
 

@@ -18,8 +18,6 @@ constexpr int kMinMerged = 16;
 /// The graph has taken a loop in that is off by less, all seven errors together.
 constexpr double kMaxTakenInSigmas = 5.0;
 
-std::size_t slot(int i) { return static_cast<std::size_t>(i); }
-
 /// How a merged keyframe hangs on a place.
 struct Hanging {
   MapEdge from_place;
