@@ -45,16 +45,14 @@ bool triangulate(const std::vector<AdjustedPose>& poses,
                  const MapTrack& track,
                  const std::vector<Eigen::Vector2d>& rays,
                  AdjustedPoint& point) {
-  point.map_from_anchor =
-      poses[static_cast<std::size_t>(track.front().keyframe)].camera_from_map().inverse();
+  point.map_from_anchor = poses[slot(track.front().keyframe)].camera_from_map().inverse();
   point.at = {rays.front().x(), rays.front().y(), 0.0};
   double a = 0.0;
   double b = 0.0;
   std::vector<std::pair<double, double>> depths;
   for (std::size_t i = 0; i < track.size(); ++i) {
     const Rigid3 camera_from_anchor =
-        poses[static_cast<std::size_t>(track[i].keyframe)].camera_from_map() *
-        point.map_from_anchor;
+        poses[slot(track[i].keyframe)].camera_from_map() * point.map_from_anchor;
     const Eigen::Vector3d at_infinity = camera_from_anchor.rotation * rays.front().homogeneous();
     const Eigen::Vector3d& t = camera_from_anchor.translation;
     const Eigen::Vector2d by_inverse_depth = t.head<2>() - rays[i] * t.z();

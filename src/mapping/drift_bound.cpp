@@ -36,8 +36,8 @@ struct Drift {
 std::vector<MapEdge> surest_way(const KeptMap& graph, int from, int to) {
   std::vector<std::vector<const MapEdge*>> edges_of(graph.map_from_keyframe.size());
   const auto add = [&](const MapEdge& edge) {
-    edges_of.at(static_cast<std::size_t>(edge.from)).push_back(&edge);
-    edges_of.at(static_cast<std::size_t>(edge.to)).push_back(&edge);
+    edges_of.at(slot(edge.from)).push_back(&edge);
+    edges_of.at(slot(edge.to)).push_back(&edge);
   };
   std::ranges::for_each(graph.motions, add);
   for (const Loop& loop : graph.loops) {
@@ -51,13 +51,13 @@ std::vector<MapEdge> surest_way(const KeptMap& graph, int from, int to) {
   };
   std::vector<Reached> reached(edges_of.size());
   std::set<std::pair<double, int>> next{{0.0, from}};
-  reached[static_cast<std::size_t>(from)].variance = 0.0;
+  reached[slot(from)].variance = 0.0;
   while (!next.empty() && next.begin()->second != to) {
     const auto [variance, node] = *next.begin();
     next.erase(next.begin());
-    for (const MapEdge* edge : edges_of[static_cast<std::size_t>(node)]) {
+    for (const MapEdge* edge : edges_of[slot(node)]) {
       const int other = edge->from == node ? edge->to : edge->from;
-      Reached& known = reached[static_cast<std::size_t>(other)];
+      Reached& known = reached[slot(other)];
       const double through = variance + edge->sigma_rad * edge->sigma_rad +
                              edge->sigma_log_scale * edge->sigma_log_scale;
       if (through < known.variance) {
@@ -69,7 +69,7 @@ std::vector<MapEdge> surest_way(const KeptMap& graph, int from, int to) {
   }
   std::vector<MapEdge> way;
   int node = to;
-  while (const MapEdge* edge = reached[static_cast<std::size_t>(node)].by) {
+  while (const MapEdge* edge = reached[slot(node)].by) {
     way.push_back(edge->to == node ? *edge : reversed(*edge));
     node = way.back().from;
   }
@@ -80,7 +80,7 @@ std::vector<MapEdge> surest_way(const KeptMap& graph, int from, int to) {
 /// Each motion's errors move the end by their lever arm.
 Drift drift_along(const KeptMap& graph, const std::vector<MapEdge>& way, const MapEdge& loop) {
   const auto pose_of = [&](int node) -> const Similarity3& {
-    return graph.map_from_keyframe.at(static_cast<std::size_t>(node));
+    return graph.map_from_keyframe.at(slot(node));
   };
   const auto square = [](double value) { return value * value; };
   const Eigen::Vector3d end = pose_of(loop.to).translation;
@@ -115,9 +115,8 @@ bool is_within_drift(const KeptMap& graph, const MapEdge& loop) {
   if (way.empty() || std::max(drift.rotation, drift.log_scale) >= kUnknown) {
     return true;
   }
-  const Similarity3& old = graph.map_from_keyframe[static_cast<std::size_t>(loop.from)];
-  const Similarity3 told =
-      old.inverse() * graph.map_from_keyframe[static_cast<std::size_t>(loop.to)];
+  const Similarity3& old = graph.map_from_keyframe[slot(loop.from)];
+  const Similarity3 told = old.inverse() * graph.map_from_keyframe[slot(loop.to)];
   const auto is_small = [](double error, double sigma_of_loop, double variance) {
     return error <= kFactor * std::hypot(sigma_of_loop, std::sqrt(variance));
   };

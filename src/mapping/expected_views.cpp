@@ -57,11 +57,11 @@ std::vector<ExpectedView> expected_views(const KeptMap& map,
                                          int number,
                                          const KeptKeyframe& keyframe) {
   const auto pose_of = [&](int node) -> const Similarity3& {
-    return map.map_from_keyframe[static_cast<std::size_t>(node)];
+    return map.map_from_keyframe[slot(node)];
   };
   std::vector<ExpectedView> views;
   for (const int place : places) {
-    const KeptKeyframe& old = map.keyframes[static_cast<std::size_t>(place)];
+    const KeptKeyframe& old = map.keyframes[slot(place)];
     const Similarity3 motion = pose_of(number).inverse() * pose_of(place);
     const SharedView there = shared_view(old, keyframe, motion);
     if (there.share < kMinShare) {

@@ -48,8 +48,6 @@ constexpr int kMaxClusters = 40;
 /// Clusters are alike, too, where the motion stays the same.
 constexpr double kLikeErrors = 2.0;
 
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
 auto distance_from_first(const KeptMap& map) {
   return [&map](const Similarity3& at) {
     return (at.translation - map.map_from_keyframe.front().translation).norm();
@@ -71,14 +69,14 @@ class Adjustment {
   };
 
   [[nodiscard]] const Camera& base_camera(int keyframe) const {
-    return keyframe < options_.num_of_other_camera ? map_.keyframes[index(keyframe)].camera
+    return keyframe < options_.num_of_other_camera ? map_.keyframes[slot(keyframe)].camera
                                                    : options_.camera;
   }
   [[nodiscard]] double* camera_change(int keyframe) {
     return keyframe < options_.num_of_other_camera ? no_change_.data() : camera_.data();
   }
   [[nodiscard]] Eigen::Vector2d uv(const MapView& view) const {
-    return map_.keyframes[index(view.keyframe)].corners[index(view.corner)].uv.cast<double>();
+    return map_.keyframes[slot(view.keyframe)].corners[slot(view.corner)].uv.cast<double>();
   }
   [[nodiscard]] Eigen::Vector2d ray(const MapView& view);
 
@@ -165,7 +163,7 @@ void Adjustment::add_corners() {
   const int num_clusters = std::clamp(num_keyframes / kKeyframesOfCluster, 2, kMaxClusters);
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     for (const MapView& view : tracks_[i]) {
-      AdjustedPose& pose = poses_[index(view.keyframe)];
+      AdjustedPose& pose = poses_[slot(view.keyframe)];
       auto* error =
           new CornerError(uv(view), base_camera(view.keyframe), points_[i], pose, sigma_px_);
       double* camera = camera_change(view.keyframe);
@@ -180,7 +178,7 @@ void Adjustment::add_corners() {
 template <int kSize, typename Error>
 void Adjustment::add(const Error& error, int from, int to, ceres::LossFunction* loss) {
   problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<Error, kSize, 6, 6>(new Error(error)),
-                            loss, poses_[index(from)].delta.data(), poses_[index(to)].delta.data());
+                            loss, poses_[slot(from)].delta.data(), poses_[slot(to)].delta.data());
 }
 
 int Adjustment::num_common_landmarks(const MapEdge& edge) const {
@@ -196,16 +194,16 @@ void Adjustment::add_edges() {
   std::vector<int> num_common(map_.keyframes.size());  // with the next keyframe
   for (const MapTrack& track : tracks_) {
     for (std::size_t i = 0; i + 1 < track.size(); ++i) {
-      num_common[index(track[i].keyframe)] += track[i].keyframe + 1 == track[i + 1].keyframe;
+      num_common[slot(track[i].keyframe)] += track[i].keyframe + 1 == track[i + 1].keyframe;
     }
   }
   const auto add_edge = [&](const MapEdge& edge, ceres::LossFunction* loss) {
-    add<6>(EdgeError(edge, map_.map_from_keyframe[index(edge.from)].scale, poses_[index(edge.from)],
-                     poses_[index(edge.to)]),
+    add<6>(EdgeError(edge, map_.map_from_keyframe[slot(edge.from)].scale, poses_[slot(edge.from)],
+                     poses_[slot(edge.to)]),
            edge.from, edge.to, loss);
   };
   for (const MapEdge& edge : map_.motions) {
-    if (edge.from + 1 != edge.to || num_common[index(edge.from)] < kFewLandmarks) {
+    if (edge.from + 1 != edge.to || num_common[slot(edge.from)] < kFewLandmarks) {
       add_edge(edge, nullptr);
     }
   }
@@ -219,14 +217,14 @@ void Adjustment::add_edges() {
 void Adjustment::add_lengths() {
   std::vector<const MapEdge*> motion_from(map_.keyframes.size());
   for (const MapEdge& edge : map_.motions) {
-    motion_from[index(edge.from)] = &edge;
+    motion_from[slot(edge.from)] = &edge;
   }
   const auto add_distance = [&](int from, int to, double log_distance, double sigma) {
-    add<1>(DistanceError{poses_[index(from)], poses_[index(to)], log_distance, sigma}, from, to);
+    add<1>(DistanceError{poses_[slot(from)], poses_[slot(to)], log_distance, sigma}, from, to);
   };
   for (std::size_t i = 0; i < map_.lengths.size(); ++i) {
     const MapLength& length = map_.lengths[i];
-    const MapEdge* edge = motion_from[index(length.keyframe)];
+    const MapEdge* edge = motion_from[slot(length.keyframe)];
     const double distance = edge == nullptr ? 0.0 : edge->from_to.translation.norm();
     if (edge != nullptr && distance > 3.0 * edge->sigma_translation) {
       add_distance(edge->from, edge->to, std::log(distance) + length.log_metres_per_unit,
@@ -315,7 +313,7 @@ void Adjustment::read_landmarks(MapAdjustment& result) const {
     landmark.in_map = points_[i].in_map().hnormalized();
     landmark.views = tracks_[i];
     const auto ray_from = [&](const MapView& view) -> Eigen::Vector3d {
-      const Rigid3 map_from_camera = poses_[index(view.keyframe)].camera_from_map().inverse();
+      const Rigid3 map_from_camera = poses_[slot(view.keyframe)].camera_from_map().inverse();
       const Eigen::Vector4d at = points_[i].in_map();
       return (at.head<3>() - at.w() * map_from_camera.translation).normalized();
     };
@@ -332,16 +330,16 @@ void Adjustment::read_poses(MapAdjustment& result) const {
   std::vector<std::vector<double>> growth(poses_.size());  // of lengths, by landmarks' depths
   for (const AdjustedLandmark& landmark : result.landmarks) {
     for (const MapView& view : landmark.views) {
-      const KeptCorner& corner = map_.keyframes[index(view.keyframe)].corners[index(view.corner)];
-      const double depth = (poses_[index(view.keyframe)].camera_from_map() * landmark.in_map).z();
+      const KeptCorner& corner = map_.keyframes[slot(view.keyframe)].corners[slot(view.corner)];
+      const double depth = (poses_[slot(view.keyframe)].camera_from_map() * landmark.in_map).z();
       if (corner.has_landmark() && depth > 0.0 && corner.in_camera.z() > 0.0F) {
-        growth[index(view.keyframe)].push_back(depth / corner.in_camera.z());
+        growth[slot(view.keyframe)].push_back(depth / corner.in_camera.z());
       }
     }
   }
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     const Rigid3 at = poses_[i].camera_from_map().inverse();
-    const bool is_known = growth[i].size() >= index(kFewLandmarks);
+    const bool is_known = growth[i].size() >= slot(kFewLandmarks);
     result.map_from_keyframe.emplace_back(
         is_known ? median(std::move(growth[i])) : map_.map_from_keyframe[i].scale, at.rotation,
         at.translation);
@@ -357,13 +355,13 @@ void Adjustment::read_covariances(MapAdjustment& result) {
   });
   std::vector<double*> asked = {camera_.data()};
   for (const int i : options_.covariance_of) {
-    asked.push_back(poses_[index(i)].delta.data());
+    asked.push_back(poses_[slot(i)].delta.data());
   }
   const auto found =
       internal::clustered_covariances(problem_, free, residuals_, asked, kLikeErrors);
   result.camera.sigma = found.front().diagonal().head<5>().cwiseSqrt();
   for (std::size_t i = 0; i < options_.covariance_of.size(); ++i) {
-    const AdjustedPose& pose = poses_[index(options_.covariance_of[i])];
+    const AdjustedPose& pose = poses_[slot(options_.covariance_of[i])];
     Eigen::Matrix<double, 6, 6> by_delta;  // of (position, rotation) by (w, v)
     by_delta << -skew(pose.translation), -Eigen::Matrix3d::Identity(), -Eigen::Matrix3d::Identity(),
         Eigen::Matrix3d::Zero();

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <span>
 #include <type_traits>
 #include <utility>
 
@@ -221,16 +220,11 @@ std::string_view flaw_of(const Loop& loop, const KeptMap& map) {
   if (!flaw.empty()) {
     return flaw;
   }
-  const auto corners_of = [&](int keyframe) {
-    return std::span(map.keyframes[static_cast<std::size_t>(keyframe)].corners);
+  const auto are_corners = [&](const auto& pair) {
+    return holds(map.keyframes[slot(loop.from)].corners, pair.first) &&
+           holds(map.keyframes[slot(loop.to)].corners, pair.second);
   };
-  return std::ranges::all_of(loop.corners,
-                             [&](const auto& pair) {
-                               return holds(corners_of(loop.from), pair.first) &&
-                                      holds(corners_of(loop.to), pair.second);
-                             })
-             ? ""
-             : "corners of its keyframes";
+  return std::ranges::all_of(loop.corners, are_corners) ? "" : "corners of its keyframes";
 }
 
 std::string_view flaw_of(const MapLength& length, const KeptMap& map) {

@@ -151,7 +151,7 @@ void MapKeeper::connect_first(KeptKeyframe& kept) {
     component_ = num_components_++;
     return;
   }
-  MapEdge edge = guessed_motion(map_.keyframes.back(), kept);
+  MapEdge edge = guessed_motion(map_.keyframes.back(), kept, node - 1);
   if (kept.frame <= last_localized_ && !map_.motions.empty()) {
     // Both frames saw the window before: the motion is as well known as the last one was.
     edge.sigma_rad = map_.motions.back().sigma_rad;
@@ -159,8 +159,6 @@ void MapKeeper::connect_first(KeptKeyframe& kept) {
   } else {
     component_ = num_components_++;
   }
-  edge.from = node - 1;
-  edge.to = node;
   map_.motions.push_back(edge);
 }
 
@@ -175,13 +173,8 @@ void MapKeeper::reopen_last(const Keyframe& keyframe) {
   }
   std::erase_if(map_.lengths, [&](const MapLength& length) { return length.keyframe == node; });
   std::vector<KeptCorner>& corners = map_.keyframes.back().corners;
-  std::map<int, KeptCorner> by_track;
-  for (const Observation& point : keyframe.points) {
-    by_track[point.track_id] = {point.track_id, point.uv.cast<float>()};
-  }
   for (KeptCorner& corner : corners) {
     corner.in_camera.setConstant(std::numeric_limits<float>::quiet_NaN());
-    by_track.erase(corner.track_id);
   }
   const bool is_place =
       !map_.keyframes.back().descriptors.empty() ||
@@ -189,8 +182,10 @@ void MapKeeper::reopen_last(const Keyframe& keyframe) {
   if (is_place) {
     return;  // loops count its corners
   }
-  for (const auto& [track_id, corner] : by_track) {
-    corners.push_back(corner);
+  for (const Observation& point : keyframe.points) {
+    if (std::ranges::find(corners, point.track_id, &KeptCorner::track_id) == corners.end()) {
+      corners.push_back({point.track_id, point.uv.cast<float>()});
+    }
   }
   std::ranges::sort(corners, {}, &KeptCorner::track_id);
 }
@@ -243,10 +238,7 @@ KeptMap MapKeeper::graph(const WindowView& view) const {
   for (std::size_t i = 1; i < keyframes.size(); ++i) {
     const int node = node_of(keyframes[i].frame);
     if (node > 0 && node == node_of(keyframes[i - 1].frame) + 1) {
-      MapEdge& edge =
-          graph.motions.emplace_back(motion_between(view, keyframes[i - 1], keyframes[i]));
-      edge.from = node - 1;
-      edge.to = node;
+      graph.motions.push_back(motion_between(view, keyframes[i - 1], keyframes[i], node - 1));
     }
   }
   return graph;
@@ -271,7 +263,7 @@ std::vector<int> MapKeeper::merge() {
     return numbers;
   }
   for (auto& [frame, node] : nodes_) {
-    node = numbers[static_cast<std::size_t>(node)];
+    node = numbers[slot(node)];
   }
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     if (numbers[i] >= 0) {
@@ -299,14 +291,11 @@ void MapKeeper::keep(const WindowView& view, std::size_t leaving) {
   // The motions to the nodes before and after, where those are in the window still.
   for (const Keyframe& other : view.window.keyframes) {
     const int neighbour = node_of(other.frame);
-    if (neighbour < 0 || std::abs(neighbour - node) != 1) {
-      continue;
+    if (neighbour >= 0 && neighbour == node - 1) {
+      map_.motions.push_back(motion_between(view, other, keyframe, neighbour));
+    } else if (neighbour == node + 1) {
+      map_.motions.push_back(motion_between(view, keyframe, other, node));
     }
-    MapEdge& edge =
-        map_.motions.emplace_back(neighbour < node ? motion_between(view, other, keyframe)
-                                                   : motion_between(view, keyframe, other));
-    edge.from = std::min(node, neighbour);
-    edge.to = std::max(node, neighbour);
   }
 }
 

@@ -65,11 +65,9 @@ class MapKeeper {
   [[nodiscard]] const KeptMap& map() const { return map_; }
   /// The keeper ends.
   [[nodiscard]] KeptMap take_map() { return std::move(map_); }
-  [[nodiscard]] KeptKeyframe& keyframe(int node) {
-    return map_.keyframes[static_cast<std::size_t>(node)];
-  }
+  [[nodiscard]] KeptKeyframe& keyframe(int node) { return map_.keyframes[slot(node)]; }
   [[nodiscard]] const Similarity3& map_from_keyframe(int node) const {
-    return map_.map_from_keyframe[static_cast<std::size_t>(node)];
+    return map_.map_from_keyframe[slot(node)];
   }
   /// The node of a keyframe of the window; -1: it is none yet.
   [[nodiscard]] int node_of(int frame) const;
@@ -84,9 +82,7 @@ class MapKeeper {
   /// The window's map is young, and another one is older.
   [[nodiscard]] bool may_soon_be_joined() const;
   [[nodiscard]] std::span<const int> components() const { return components_; }
-  [[nodiscard]] int component_of(int node) const {
-    return components_[static_cast<std::size_t>(node)];
-  }
+  [[nodiscard]] int component_of(int node) const { return components_[slot(node)]; }
 
  private:
   void add_node(const WindowView& view, const Keyframe& keyframe);

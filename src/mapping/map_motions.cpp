@@ -58,12 +58,11 @@ double log_scale_sigma(const Window& window,
 
 }  // namespace
 
-MapEdge motion_between(const WindowView& view, const Keyframe& from, const Keyframe& to) {
+MapEdge motion_between(const WindowView& view, const Keyframe& from, const Keyframe& to, int node) {
   const double units_of_from = view.history.units(from.frame);
   const double units_of_to = view.history.units(to.frame);
   const Rigid3 from_to = from.world_from_camera.inverse() * to.world_from_camera;
-  MapEdge edge;
-  edge.from_to = scaled(units_of_from, from_to);
+  MapEdge edge{.from = node, .to = node + 1, .from_to = scaled(units_of_from, from_to)};
   edge.from_to.scale = units_of_from / units_of_to;
   const SeenLandmarks seen = find_seen_landmarks(view.window, to.points);
   const Rigid3 camera_from_world = to.world_from_camera.inverse();
@@ -91,14 +90,14 @@ MapEdge motion_between(const WindowView& view, const Keyframe& from, const Keyfr
   return edge;
 }
 
-MapEdge guessed_motion(const KeptKeyframe& from, const KeptKeyframe& to) {
+MapEdge guessed_motion(const KeptKeyframe& from, const KeptKeyframe& to, int node) {
   const Rigid3 from_to = from.world_from_camera.inverse() * to.world_from_camera;
-  MapEdge edge;
-  edge.from_to = Similarity3(from_to);
-  edge.sigma_rad = kGuess_rad;
-  edge.sigma_translation = std::max(1.0, from_to.translation.norm());
-  edge.sigma_log_scale = kGuessLogScale;
-  return edge;
+  return {node,
+          node + 1,
+          Similarity3(from_to),
+          kGuess_rad,
+          std::max(1.0, from_to.translation.norm()),
+          kGuessLogScale};
 }
 
 }  // namespace stemvo

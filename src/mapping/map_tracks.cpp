@@ -29,7 +29,7 @@ class SameLandmark {
     std::iota(first_.begin(), first_.end(), 0U);
   }
   [[nodiscard]] std::size_t index_of(int keyframe, std::size_t corner) const {
-    return begin_[static_cast<std::size_t>(keyframe)] + corner;
+    return begin_[slot(keyframe)] + corner;
   }
   /// The first of the corners that are the same.
   [[nodiscard]] std::size_t first_of(std::size_t index) {
@@ -55,7 +55,7 @@ void join_tracks(const KeptMap& map, SameLandmark& same) {
   };
   std::unordered_map<int, Last> last;  // by track id
   for (int i = 0; i < static_cast<int>(map.keyframes.size()); ++i) {
-    const auto& corners = map.keyframes[static_cast<std::size_t>(i)].corners;
+    const auto& corners = map.keyframes[slot(i)].corners;
     for (std::size_t j = 0; j < corners.size(); ++j) {
       const Last here{i, same.index_of(i, j)};
       const auto [at, is_new] = last.try_emplace(corners[j].track_id, here);
@@ -73,8 +73,7 @@ void join_loops(const KeptMap& map, SameLandmark& same) {
       continue;
     }
     for (const auto& [from, to] : loop.corners) {
-      same.join(same.index_of(loop.from, static_cast<std::size_t>(from)),
-                same.index_of(loop.to, static_cast<std::size_t>(to)));
+      same.join(same.index_of(loop.from, slot(from)), same.index_of(loop.to, slot(to)));
     }
   }
 }
@@ -114,7 +113,7 @@ std::vector<MapTrack> tracks_of(const KeptMap& map) {
   std::vector<MapTrack> tracks;
   std::unordered_map<std::size_t, std::size_t> track_of;  // first corner -> track
   for (int i = 0; i < static_cast<int>(map.keyframes.size()); ++i) {
-    const std::size_t num = map.keyframes[static_cast<std::size_t>(i)].corners.size();
+    const std::size_t num = map.keyframes[slot(i)].corners.size();
     for (std::size_t j = 0; j < num; ++j) {
       const auto [at, is_new] =
           track_of.try_emplace(same.first_of(same.index_of(i, j)), tracks.size());
@@ -143,7 +142,7 @@ std::vector<MapTrack> choose_tracks(std::vector<MapTrack> tracks,
   std::vector<std::size_t> num(num_keyframes);
   std::erase_if(tracks, [&](const MapTrack& track) {
     const auto count = [&](const MapView& view) -> std::size_t& {
-      return num[static_cast<std::size_t>(view.keyframe)];
+      return num[slot(view.keyframe)];
     };
     if (std::ranges::all_of(track, [&](const MapView& view) { return count(view) >= share; })) {
       return true;

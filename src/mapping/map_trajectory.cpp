@@ -24,7 +24,7 @@ std::vector<char> find_connected(const KeptMap& map) {
   constexpr double kMaxStepSigmas = 5.0;
   std::vector<char> connected(map.keyframes.size());
   for (const MapEdge& edge : map.motions) {
-    const auto to = static_cast<std::size_t>(edge.to);
+    const auto to = slot(edge.to);
     if (edge.from + 1 == edge.to) {
       const Rigid3 came =
           map.keyframes[to - 1].world_from_camera.inverse() * map.keyframes[to].world_from_camera;
@@ -59,10 +59,8 @@ std::vector<Placed> placed_frames(const KeptMap& map, int num_frames) {
     place(map.keyframes[i], map.map_from_keyframe[i], false, connected[i] != 0);
   }
   for (const MergedKeyframe& merged : map.merged) {
-    place(merged,
-          map.map_from_keyframe[static_cast<std::size_t>(merged.keyframe)] *
-              merged.keyframe_from_merged,
-          true, true);
+    place(merged, map.map_from_keyframe[slot(merged.keyframe)] * merged.keyframe_from_merged, true,
+          true);
   }
   std::ranges::sort(placed, {}, &Placed::frame);
   // The motion from what was merged is an edge of its place now.

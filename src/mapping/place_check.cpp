@@ -51,9 +51,7 @@ double bound_px(const Camera& camera) {
   return std::max(kMinBound_px, kBound_px * camera.mean_focal_px() / kFocal_px);
 }
 
-const KeptCorner& corner_of(const PlaceView& view, int index) {
-  return view.corners[static_cast<std::size_t>(index)];
-}
+const KeptCorner& corner_of(const PlaceView& view, int index) { return view.corners[slot(index)]; }
 Eigen::Vector3d landmark_of(const PlaceView& view, int index) {
   return corner_of(view, index).in_camera.cast<double>();
 }
@@ -121,8 +119,8 @@ std::vector<DescriptorPair> match_near(const Similarity3& by_from_of,
         }
       }
     }
-    if (nearest >= 0 && least < best[static_cast<std::size_t>(nearest)].num_bits) {
-      best[static_cast<std::size_t>(nearest)] = {mine, least};
+    if (nearest >= 0 && least < best[slot(nearest)].num_bits) {
+      best[slot(nearest)] = {mine, least};
     }
   }
   std::vector<DescriptorPair> pairs;

@@ -120,7 +120,7 @@ Graph::Graph(const KeptMap& map) : problem_(shared_parts()) {
     length.sigma = independent_sigma(map, i);
     problem_.AddResidualBlock(
         new ceres::AutoDiffCostFunction<LengthError, 1, 8>(new LengthError{length}), nullptr,
-        nodes_.at(static_cast<std::size_t>(length.keyframe)).data());
+        nodes_.at(slot(length.keyframe)).data());
   }
 }
 
@@ -130,8 +130,7 @@ void Graph::add(const MapEdge& edge, ceres::LossFunction* loss) {
                "an edge connects two keyframes and has sigmas");
   problem_.AddResidualBlock(
       new ceres::AutoDiffCostFunction<MotionError, 7, 8, 8>(new MotionError{edge}), loss,
-      nodes_.at(static_cast<std::size_t>(edge.from)).data(),
-      nodes_.at(static_cast<std::size_t>(edge.to)).data());
+      nodes_.at(slot(edge.from)).data(), nodes_.at(slot(edge.to)).data());
 }
 
 bool Graph::solve(double loop_loss) {
@@ -157,7 +156,7 @@ std::vector<Similarity3> Graph::similarities() const {
 
 double independent_sigma(const KeptMap& map, std::size_t length) {
   const auto time_of = [&](const MapLength& one) {
-    return map.keyframes.at(static_cast<std::size_t>(one.keyframe)).time_s;
+    return map.keyframes.at(slot(one.keyframe)).time_s;
   };
   const MapLength& at = map.lengths[length];
   const double interval_s = length > 0 ? time_of(at) - time_of(map.lengths[length - 1]) : 0.0;
@@ -168,8 +167,8 @@ double independent_sigma(const KeptMap& map, std::size_t length) {
 }
 
 double sigmas_off(const KeptMap& map, const MapEdge& edge) {
-  const Node from = node_of(map.map_from_keyframe.at(static_cast<std::size_t>(edge.from)));
-  const Node to = node_of(map.map_from_keyframe.at(static_cast<std::size_t>(edge.to)));
+  const Node from = node_of(map.map_from_keyframe.at(slot(edge.from)));
+  const Node to = node_of(map.map_from_keyframe.at(slot(edge.to)));
   Eigen::Matrix<double, 7, 1> error;
   MotionError{edge}(from.data(), to.data(), error.data());
   return error.norm();
