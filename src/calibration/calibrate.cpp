@@ -51,7 +51,7 @@ Status check_request(const CalibrationRequest& request, const FrameSource& seque
 /// The map that the odometry leaves of the recording.
 Expected<KeptMap> drive(const CalibrationRequest& request,
                         const FrameSource& sequence,
-                        const CalibrationProgress& progress,
+                        const RunProgress& progress,
                         CalibrationReport& report) {
   Config config = request.config;
   config.odometry.mode = OdometryMode::kMap;
@@ -137,7 +137,7 @@ Status write_camera(const fs::path& from,
 }  // namespace
 
 Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request,
-                                               const CalibrationProgress& progress) {
+                                               const RunProgress& progress) {
   STEMVO_TRY(validate(request.config));
   FrameSourceRequest source = request;
   source.SequenceOptions::camera = request.config.input.camera;

@@ -4,12 +4,12 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "config/config.hpp"
 #include "dataset/frame_source.hpp"
+#include "pipeline/run.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
 
@@ -47,17 +47,14 @@ struct CalibrationReport {
   bool written = false;               ///< false also where nothing is determined
 };
 
-/// After each frame: done, in all (0: not known); false stops.
-using CalibrationProgress = std::function<bool(std::size_t, std::size_t)>;
-
 /// The camera that one adjustment of a whole recording finds (mapping/map_adjustment.hpp): any
 /// recording that `run` takes. Ground truth is never read. Writes out_file; in KITTI's layout as
 /// calib.txt: rows of cameras that share the refined camera's intrinsics get the new ones, their
 /// baselines stay, other lines are kept; else as camera.yaml. Same input, same bytes. Errors: those
 /// of the recording and the model, out_file that cannot be written or is an input, too few frames
 /// that move.
-[[nodiscard]] Expected<CalibrationReport> calibrate_sequence(
-    const CalibrationRequest& request, const CalibrationProgress& progress = {});
+[[nodiscard]] Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request,
+                                                             const RunProgress& progress = {});
 
 /// Given, refined, standard deviation; what they rest on.
 [[nodiscard]] std::string format_calibration_table(const CalibrationReport& report);

@@ -24,40 +24,33 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Looks for the board in pictures.
-class ViewCollector {
- public:
-  ViewCollector(const BoardRequest& request, BoardReport& report)
-      : request_(request), report_(report) {}
-
-  /// `must_differ`: from the views so far.
-  Status add(const std::string& name, const cv::Mat& gray, bool must_differ) {
-    ++report_.num_pictures;
-    STEMVO_TRY_GET(BoardPoints points, find_board(request_.board, gray));
-    if (!points.in_image.empty() && (!must_differ || differs(points, gray.size()))) {
-      report_.views.push_back({name, std::move(points)});
+/// Most corners of it are elsewhere in every view so far.
+bool differs(const BoardPoints& points, const cv::Size& size, const std::vector<BoardView>& views) {
+  constexpr double kMinShift = 0.04;  // of the image's width
+  return std::ranges::none_of(views, [&](const BoardView& view) {
+    const auto& others = view.points.in_image;
+    const std::size_t count = std::min(others.size(), points.in_image.size());
+    double sum_px = 0.0;
+    for (std::size_t i = 0; i < count; ++i) {
+      sum_px += cv::norm(others[i] - points.in_image[i]);
     }
-    return {};
-  }
+    return sum_px < kMinShift * size.width * static_cast<double>(count);
+  });
+}
 
- private:
-  /// Most corners of it are elsewhere in every view so far.
-  [[nodiscard]] bool differs(const BoardPoints& points, const cv::Size& size) const {
-    constexpr double kMinShift = 0.04;  // of the image's width
-    return std::ranges::none_of(report_.views, [&](const BoardView& view) {
-      const auto& others = view.points.in_image;
-      const std::size_t count = std::min(others.size(), points.in_image.size());
-      double sum_px = 0.0;
-      for (std::size_t i = 0; i < count; ++i) {
-        sum_px += cv::norm(others[i] - points.in_image[i]);
-      }
-      return sum_px < kMinShift * size.width * static_cast<double>(count);
-    });
+/// Adds the view of a picture, if the board is in it. `must_differ`: from the views so far.
+Status add_view(const Board& board,
+                const std::string& name,
+                const cv::Mat& gray,
+                bool must_differ,
+                BoardReport& report) {
+  ++report.num_pictures;
+  STEMVO_TRY_GET(BoardPoints points, find_board(board, gray));
+  if (!points.in_image.empty() && (!must_differ || differs(points, gray.size(), report.views))) {
+    report.views.push_back({name, std::move(points)});
   }
-
-  const BoardRequest& request_;
-  BoardReport& report_;
-};
+  return {};
+}
 
 /// Beside the camera file.
 fs::path coverage_file(const BoardRequest& request) {
@@ -80,7 +73,7 @@ Status check_place(const fs::path& out, const fs::path& picture) {
 
 /// The size that most pictures have.
 Expected<cv::Size> look_at_images(const BoardRequest& request,
-                                  const CalibrationProgress& progress,
+                                  const RunProgress& progress,
                                   BoardReport& report) {
   const fs::path inside = request.pictures / "images";
   STEMVO_TRY_GET(const auto listing,
@@ -89,11 +82,11 @@ Expected<cv::Size> look_at_images(const BoardRequest& request,
   frames.files = listing.files;
   STEMVO_TRY(check_place(request.out_file, frames.files.front()));
   STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames));
-  ViewCollector collector(request, report);
   for (std::size_t i = 0; i < frames.files.size() && !report.interrupted; ++i) {
     const auto image = io::read_image(frames.files[i], false, kind.size, kind.levels);
     if (image) {
-      STEMVO_TRY(collector.add(frames.files[i].filename().string(), *image, false));
+      STEMVO_TRY(
+          add_view(request.board, frames.files[i].filename().string(), *image, false, report));
     } else {
       report.warnings.push_back(image.error().message);
     }
@@ -103,7 +96,7 @@ Expected<cv::Size> look_at_images(const BoardRequest& request,
 }
 
 Expected<cv::Size> look_at_video(const BoardRequest& request,
-                                 const CalibrationProgress& progress,
+                                 const RunProgress& progress,
                                  BoardReport& report) {
   STEMVO_TRY(pipeline::check_is_no_input(request.out_file, {request.pictures}));
   STEMVO_TRY_GET(const auto stream, dataset::VideoStream::open_file(request.pictures, {}));
@@ -111,7 +104,6 @@ Expected<cv::Size> look_at_video(const BoardRequest& request,
   constexpr std::size_t kUsualStep = 5;
   const std::size_t num_frames = stream->expected_frames();
   const std::size_t step = num_frames > 0 ? num_frames / kMaxLooks + 1 : kUsualStep;
-  ViewCollector collector(request, report);
   for (std::size_t i = 0; !report.interrupted; ++i) {
     STEMVO_TRY_GET(const cv::Mat image, stream->read(i));
     if (image.empty()) {
@@ -120,7 +112,7 @@ Expected<cv::Size> look_at_video(const BoardRequest& request,
     if (i % step == 0) {
       cv::Mat gray;
       cv::cvtColor(image, gray, cv::COLOR_RGB2GRAY);
-      STEMVO_TRY(collector.add(fmt::format("frame {}", i), gray, true));
+      STEMVO_TRY(add_view(request.board, fmt::format("frame {}", i), gray, true, report));
     }
     report.interrupted = progress && !progress(i + 1, std::max(num_frames, i + 2));
   }
@@ -148,8 +140,7 @@ Status write_files(const BoardRequest& request, const cv::Size& size, BoardRepor
 
 }  // namespace
 
-Expected<BoardReport> calibrate_board(const BoardRequest& request,
-                                      const CalibrationProgress& progress) {
+Expected<BoardReport> calibrate_board(const BoardRequest& request, const RunProgress& progress) {
   STEMVO_TRY(check_can_write(request.out_file));
   std::error_code code;
   const auto look =

@@ -36,7 +36,7 @@ struct BoardReport {
 /// out_file (with errors and sigmas as comments) and the picture of what is covered. Errors: no
 /// pictures, under three with the board, files that cannot be written.
 [[nodiscard]] Expected<BoardReport> calibrate_board(const BoardRequest& request,
-                                                    const CalibrationProgress& progress = {});
+                                                    const RunProgress& progress = {});
 
 /// Numbers with their sigmas, views left out, pictures to take next.
 [[nodiscard]] std::string format_board_table(const BoardReport& report);

@@ -259,10 +259,6 @@ std::string parse(const YAML::Node& node, std::vector<double>& value) {
   return {};
 }
 
-std::string format(bool value) { return fmt::format("{}", value); }
-std::string format(int value) { return fmt::format("{}", value); }
-std::string format(std::uint64_t value) { return fmt::format("{}", value); }
-
 /// The shortest text that reads back to the same double, with a point.
 std::string format(double value) {
   const std::string text = fmt::format("{}", value);

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <concepts>
 #include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
 #include "options/visit.hpp"
@@ -36,10 +38,11 @@ template <options::Enumeration Enum>
 }
 
 /// YAML of a value, exact: numbers read back to the same bits.
-[[nodiscard]] std::string format(bool value);
-[[nodiscard]] std::string format(int value);
+template <std::integral Integer>  // or bool
+[[nodiscard]] std::string format(Integer value) {
+  return fmt::format("{}", value);
+}
 [[nodiscard]] std::string format(double value);
-[[nodiscard]] std::string format(std::uint64_t value);
 [[nodiscard]] std::string format(const std::string& value);
 [[nodiscard]] std::string format(const std::vector<double>& value);
 template <options::Enumeration Enum>

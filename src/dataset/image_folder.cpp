@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The times of all images, where something says them.
-Expected<ImageTimes> find_times(const Listing& listing, const FrameSourceRequest& request) {
+Expected<TimedRows<double>> find_times(const Listing& listing, const FrameSourceRequest& request) {
   const std::size_t num_images = listing.files.size();
   const auto& file = request.times ? request.times : listing.times_file;
   if (request.rate_hz && (file || !listing.times_s.empty())) {
@@ -21,23 +21,14 @@ Expected<ImageTimes> find_times(const Listing& listing, const FrameSourceRequest
                             file ? file->string() : "those of the list of images"));
   }
   if (!file) {
-    return ImageTimes{listing.times_s, listing.note};
+    return TimedRows<double>{listing.times_s, listing.note};
   }
   auto read = read_kitti_times(*file, num_images);
-  if (read && read->times_s.size() != num_images) {
+  if (read && read->rows.size() != num_images) {
     return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
-                            file->string(), num_images, read->times_s.size()));
+                            file->string(), num_images, read->rows.size()));
   }
   return read;
-}
-
-/// The times of a range of images that nothing says the times of.
-std::vector<double> count_times(const FrameRange& range, double rate_hz) {
-  std::vector<double> times_s;
-  for (std::size_t i = range.begin; i < range.end; ++i) {
-    times_s.push_back(static_cast<double>(i) / rate_hz);
-  }
-  return times_s;
 }
 
 /// Error: images that are not of the camera file's size.
@@ -70,13 +61,16 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
   STEMVO_TRY_GET(const auto range, resolve_range(request.frames, listing.files.size(),
                                                  request.sequence_dir.string()));
   STEMVO_TRY_GET(auto times, find_times(listing, request));
-  const bool has_times = !times.times_s.empty();
-  times.times_s.resize(listing.files.size());
-  FrameSource frames = list_frames(range, listing.files, times.times_s);
+  const bool has_times = !times.rows.empty();
+  times.rows.resize(listing.files.size());
+  FrameSource frames = list_frames(range, listing.files, times.rows);
   frames.warnings = camera_file.warnings;
   add_note(frames, times.note);
   if (!has_times) {
-    frames.timestamps_s = count_times(range, rate_of(camera_file, request, frames));
+    const double rate_hz = rate_of(camera_file, request, frames);
+    for (std::size_t i = 0; i < frames.timestamps_s.size(); ++i) {
+      frames.timestamps_s[i] = static_cast<double>(range.begin + i) / rate_hz;
+    }
   }
   if (const auto& truth = request.ground_truth ? request.ground_truth : listing.ground_truth) {
     STEMVO_TRY(add_ground_truth(frames, *truth, camera_path, request.ground_truth_tolerance_s,

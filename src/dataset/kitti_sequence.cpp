@@ -87,18 +87,6 @@ std::optional<fs::path> find_ground_truth(const fs::path& absolute, const std::s
   return std::nullopt;
 }
 
-/// Adds the poses of the file that was asked for, or of the sequence's own, if there is one.
-Status add_truth(const fs::path& absolute,
-                 const SequenceOptions& options,
-                 std::size_t num_images,
-                 FrameSource& frames) {
-  const auto file =
-      options.ground_truth ? options.ground_truth : find_ground_truth(absolute, frames.name);
-  return file ? dataset::add_ground_truth(frames, *file, std::nullopt,
-                                          options.ground_truth_tolerance_s, num_images, false)
-              : Status();
-}
-
 /// Sets the size that most images have, and how one is read.
 Status set_images(const fs::path& calibration, bool is_color, FrameSource& frames) {
   STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames));
@@ -138,14 +126,19 @@ Expected<FrameSource> open_kitti(const fs::path& directory, const SequenceOption
   STEMVO_TRY_GET(const auto camera, dataset::read_kitti_camera(calibration, camera_index));
   STEMVO_TRY_GET(const auto times, dataset::read_kitti_times(directory / "times.txt", range.end));
   const fs::path absolute = dataset::absolute_folder(directory);
-  FrameSource frames = dataset::list_frames(range, images, times.times_s);
+  FrameSource frames = dataset::list_frames(range, images, times.rows);
   dataset::add_note(frames, times.note);
   frames.kind = "KITTI sequence";
   frames.is_kitti = true;
   frames.name = absolute.filename().string();
   frames.camera = camera;
   frames.given_calibration = options.calibration;
-  STEMVO_TRY(add_truth(absolute, options, images.size(), frames));
+  const auto truth =
+      options.ground_truth ? options.ground_truth : find_ground_truth(absolute, frames.name);
+  if (truth) {
+    STEMVO_TRY(dataset::add_ground_truth(frames, *truth, std::nullopt,
+                                         options.ground_truth_tolerance_s, images.size(), false));
+  }
   STEMVO_TRY(set_images(calibration, camera_index >= 2, frames));
   STEMVO_TRY_GET(frames.mask, dataset::make_mask(options.masks, frames.full_size));
   return frames;

@@ -92,15 +92,16 @@ Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
   return text;
 }
 
-Expected<ImageTimes> read_kitti_times(const std::filesystem::path& file, std::size_t num_expected) {
+Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
+                                             std::size_t num_expected) {
   STEMVO_TRY_GET(const auto found, read_timed_rows(file, {1}, "a time"));
-  ImageTimes times{.times_s = {}, .note = found.note};
+  TimedRows<double> times{.note = found.note};
   for (const TimedRow& row : found.rows) {
-    times.times_s.push_back(row.time_s);
+    times.rows.push_back(row.time_s);
   }
-  if (times.times_s.size() < num_expected) {
+  if (times.rows.size() < num_expected) {
     return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
-                            file.string(), num_expected, times.times_s.size()));
+                            file.string(), num_expected, times.rows.size()));
   }
   return times;
 }

@@ -3,10 +3,10 @@
 
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::dataset {
 
@@ -22,14 +22,9 @@ namespace stemvo::dataset {
                                                          const Camera& given,
                                                          const Camera& refined);
 
-/// Times of images.
-struct ImageTimes {
-  std::vector<double> times_s;
-  std::string note;  ///< how they were found, for people; may be empty
-};
 /// One time per line, as read_timed_rows reads them, for at least `num_expected` images. Errors:
 /// not one finite number in a line, not increasing, fewer lines.
-[[nodiscard]] Expected<ImageTimes> read_kitti_times(const std::filesystem::path& file,
-                                                    std::size_t num_expected);
+[[nodiscard]] Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
+                                                           std::size_t num_expected);
 
 }  // namespace stemvo::dataset

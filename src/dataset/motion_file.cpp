@@ -35,11 +35,11 @@ Eigen::Vector3d rate_at(const std::vector<GyroRow>& rows, double time_s) {
 
 }  // namespace
 
-Expected<MotionRows<SpeedRow>> read_speeds(const std::filesystem::path& file) {
+Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file) {
   constexpr double kSigmaShare = 0.02;
   constexpr double kMinSigma = 0.05;
   STEMVO_TRY_GET(const auto found, read_timed_rows(file, {2, 3}, "a time, m/s and maybe a sigma"));
-  MotionRows<SpeedRow> speeds{.rows = {}, .note = found.note};
+  TimedRows<SpeedRow> speeds{.rows = {}, .note = found.note};
   for (const TimedRow& row : found.rows) {
     STEMVO_TRY_GET(const auto numbers, numbers_of(row, file));
     const double sigma =
@@ -53,10 +53,10 @@ Expected<MotionRows<SpeedRow>> read_speeds(const std::filesystem::path& file) {
   return speeds;
 }
 
-Expected<MotionRows<GyroRow>> read_gyro(const std::filesystem::path& file) {
+Expected<TimedRows<GyroRow>> read_gyro(const std::filesystem::path& file) {
   STEMVO_TRY_GET(const auto found,
                  read_timed_rows(file, {4, 7}, "a time and rad/s about x, y and z"));
-  MotionRows<GyroRow> rates{.rows = {}, .note = found.note};
+  TimedRows<GyroRow> rates{.rows = {}, .note = found.note};
   for (const TimedRow& row : found.rows) {
     STEMVO_TRY_GET(const auto numbers, numbers_of(row, file));
     rates.rows.push_back({row.time_s, Eigen::Vector3d(numbers[0], numbers[1], numbers[2])});

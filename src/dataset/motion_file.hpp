@@ -3,13 +3,13 @@
 
 #include <filesystem>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
 #include "stemvo/error.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::dataset {
 
@@ -26,21 +26,14 @@ struct GyroRow {
   Eigen::Vector3d rad_per_s = Eigen::Vector3d::Zero();
 };
 
-/// A file of either.
-template <typename Row>
-struct MotionRows {
-  std::vector<Row> rows;
-  std::string note;  ///< names the unit of times that was found, for people; may be empty
-};
-
 /// Rows `time, m/s` or `time, m/s, sigma`, between commas or blanks, `#` before comments; times in
 /// seconds rise. A row without a sigma has 2 % of its speed, and at least 0.05 m/s. Errors, naming
 /// file and line: unreadable, other rows, a sigma that is not above 0, no row.
-[[nodiscard]] Expected<MotionRows<SpeedRow>> read_speeds(const std::filesystem::path& file);
+[[nodiscard]] Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file);
 
 /// Rows `time, x, y, z` in rad/s, likewise; or EuRoC's imu0/data.csv, whose comment says [ns], with
 /// the accelerations behind them.
-[[nodiscard]] Expected<MotionRows<GyroRow>> read_gyro(const std::filesystem::path& file);
+[[nodiscard]] Expected<TimedRows<GyroRow>> read_gyro(const std::filesystem::path& file);
 
 /// Rotation prev_from_cur of the gyro's own axes between two times: rates change evenly from row to
 /// row. nullopt: the rows leave 0.1 s or more of it out.

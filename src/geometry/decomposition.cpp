@@ -81,19 +81,4 @@ std::array<Rigid3, 4> decompose_essential(const Eigen::Matrix3d& essential) {
           Rigid3::from_matrix(first, -t), Rigid3::from_matrix(second, -t)};
 }
 
-Eigen::Matrix3d essential_from_fundamental(const Eigen::Matrix3d& fundamental,
-                                           const Camera& camera) {
-  const Eigen::Matrix3d k = camera.matrix();
-  return k.transpose() * fundamental * k;
-}
-
-Eigen::Matrix3d fundamental_from_essential(const Eigen::Matrix3d& essential, const Camera& camera) {
-  const Eigen::Matrix3d k_inverse = camera.matrix().inverse();
-  return k_inverse.transpose() * essential * k_inverse;
-}
-
-Eigen::Matrix3d essential_from_motion(const Rigid3& cur_from_prev) {
-  return skew(cur_from_prev.translation) * cur_from_prev.rotation_matrix();
-}
-
 }  // namespace stemvo

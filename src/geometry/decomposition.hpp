@@ -22,12 +22,22 @@ namespace stemvo {
 [[nodiscard]] std::array<Rigid3, 4> decompose_essential(const Eigen::Matrix3d& essential);
 
 /// E = K^T F K.
-[[nodiscard]] Eigen::Matrix3d essential_from_fundamental(const Eigen::Matrix3d& fundamental,
-                                                         const Camera& camera);
+[[nodiscard]] inline Eigen::Matrix3d essential_from_fundamental(const Eigen::Matrix3d& fundamental,
+                                                                const Camera& camera) {
+  const Eigen::Matrix3d k = camera.matrix();
+  return k.transpose() * fundamental * k;
+}
+
 /// F = K^-T E K^-1.
-[[nodiscard]] Eigen::Matrix3d fundamental_from_essential(const Eigen::Matrix3d& essential,
-                                                         const Camera& camera);
+[[nodiscard]] inline Eigen::Matrix3d fundamental_from_essential(const Eigen::Matrix3d& essential,
+                                                                const Camera& camera) {
+  const Eigen::Matrix3d k_inverse = camera.matrix().inverse();
+  return k_inverse.transpose() * essential * k_inverse;
+}
+
 /// E = [t]x R.
-[[nodiscard]] Eigen::Matrix3d essential_from_motion(const Rigid3& cur_from_prev);
+[[nodiscard]] inline Eigen::Matrix3d essential_from_motion(const Rigid3& cur_from_prev) {
+  return skew(cur_from_prev.translation) * cur_from_prev.rotation_matrix();
+}
 
 }  // namespace stemvo

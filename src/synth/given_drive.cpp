@@ -101,25 +101,22 @@ RoadCurve fit_road(const Trajectory& keys) {
   return RoadCurve(resample(ground, 1.0));
 }
 
-/// Arc length of the knot nearest to `point` among those near `guess_m`.
-double nearest_arc_m(const RoadCurve& road, const Vec3& point, double guess_m) {
-  constexpr int kReach = 24;  // knots; a car moves less between two frames
-  const int guess = static_cast<int>(guess_m);
-  int best = guess;
-  const int end = std::min(guess + kReach + 1, road.num_knots());
-  const auto distance2 = [&](int i) { return (road.knot(i).position - point).squaredNorm(); };
-  for (int i = std::max(guess - kReach, 0); i < end; ++i) {
-    best = distance2(i) < distance2(best) ? i : best;
-  }
-  return best;
-}
-
+/// Per camera the arc length of the nearest knot, of those near the last camera's.
 std::vector<double> arcs_along(const RoadCurve& road, const Trajectory& world_from_camera) {
+  constexpr int kReach = 24;  // knots; a car moves less between two frames
   std::vector<double> arcs_m;
-  double arc_m = kRoadBehind_m + kStraightOn_m;
+  int last = static_cast<int>(kRoadBehind_m + kStraightOn_m);
   for (const Rigid3& pose : world_from_camera) {
-    arc_m = nearest_arc_m(road, pose.translation, arc_m);
-    arcs_m.push_back(arc_m);
+    const auto distance2 = [&](int i) {
+      return (road.knot(i).position - pose.translation).squaredNorm();
+    };
+    int best = last;
+    const int end = std::min(last + kReach + 1, road.num_knots());
+    for (int i = std::max(last - kReach, 0); i < end; ++i) {
+      best = distance2(i) < distance2(best) ? i : best;
+    }
+    last = best;
+    arcs_m.push_back(best);
   }
   return arcs_m;
 }

@@ -192,12 +192,12 @@ std::string find_unit(std::vector<TimedRow>& rows) {
 
 }  // namespace
 
-Expected<TimedRows> read_timed_rows(const fs::path& file,
-                                    std::initializer_list<std::size_t> counts,
-                                    std::string_view form,
-                                    double unit_s) {
+Expected<TimedRows<TimedRow>> read_timed_rows(const fs::path& file,
+                                              std::initializer_list<std::size_t> counts,
+                                              std::string_view form,
+                                              double unit_s) {
   STEMVO_TRY_GET(const auto lines, read_lines(file));
-  TimedRows result;
+  TimedRows<TimedRow> result;
   std::vector<TimedRow>& rows = result.rows;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const std::size_t comment = std::min(lines[i].find('#'), lines[i].size());

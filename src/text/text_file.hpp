@@ -61,19 +61,22 @@ struct TimedRow {
   std::string rest;      ///< words between blanks
   std::size_t line = 0;  ///< counted from 0
 };
-/// The rows of such a file, at least one.
+/// What was read from such a file, at least one row.
+template <typename Row>
 struct TimedRows {
-  std::vector<TimedRow> rows;
-  std::string note;  ///< names the unit that was found by the steps, for people; else empty
+  std::vector<Row> rows = {};
+  std::string note = {};  ///< names the unit that was found by the steps, for people; else empty
 };
+
 /// Rows of one of these numbers of words, between commas or blanks, `#` before comments; the times
 /// rise, in this unit, or in ns where a comment says [ns]; seconds by default, or, where the usual
 /// step would be over 3 s, what makes it shorter: ms, us or ns. `form` names a row. Errors, with
 /// file and line: unreadable, other rows, no row.
-[[nodiscard]] Expected<TimedRows> read_timed_rows(const std::filesystem::path& file,
-                                                  std::initializer_list<std::size_t> counts,
-                                                  std::string_view form,
-                                                  double unit_s = 1.0);
+[[nodiscard]] Expected<TimedRows<TimedRow>> read_timed_rows(
+    const std::filesystem::path& file,
+    std::initializer_list<std::size_t> counts,
+    std::string_view form,
+    double unit_s = 1.0);
 
 /// Decimal digits alone; nullopt: another text, or too large.
 [[nodiscard]] std::optional<std::size_t> parse_index(std::string_view text);

@@ -40,11 +40,6 @@ double read_ms(clockid_t clock) {
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
-double ms_between(std::chrono::steady_clock::time_point from,
-                  std::chrono::steady_clock::time_point to) {
-  return std::chrono::duration<double, std::milli>(to - from).count();
-}
-
 /// VmHWM of /proc/self/status: unlike getrusage, not that of the program that started this one.
 double peak_memory_mib() {
   std::ifstream status("/proc/self/status");
@@ -115,7 +110,8 @@ StageTimer::StageTimer(Stage stage) : recorder_(StageRecorder::active()), stage_
 StageTimer::~StageTimer() {
   if (recorder_ != nullptr) {
     const double spent_ms = read_ms(CLOCK_THREAD_CPUTIME_ID) - cpu_ms_;
-    recorder_->add(stage_, ms_between(wall_, std::chrono::steady_clock::now()), spent_ms);
+    const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - wall_;
+    recorder_->add(stage_, wall.count(), spent_ms);
   }
 }
 
