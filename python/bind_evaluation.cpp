@@ -17,7 +17,7 @@
 #include <nlohmann/json.hpp>
 
 #include "arrays.hpp"
-#include "dataset/ground_truth.hpp"
+#include "dataset/frame_files.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/metrics_json.hpp"
 

@@ -7,8 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "dataset/ground_truth.hpp"
-#include "dataset/mask.hpp"
 #include "odometry/check_frame.hpp"
 #include "try.hpp"
 

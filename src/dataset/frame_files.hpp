@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -100,5 +101,34 @@ struct SharedKind {
 /// throw the rest away; levels that differ from all of 16 bits are a warning. Error: none can be
 /// read.
 [[nodiscard]] Expected<SharedKind> vote_on_images(FrameSource& frames);
+
+/// Parts of the frames, in their pixels as they come, where no points are wanted: rectangles
+/// `X,Y,WIDTH,HEIGHT`, which may reach over the rim, and image files of the frames' size, black
+/// (below 128) where none. Returns CV_8UC1, 0 there and 255 elsewhere; nothing asked for: an empty
+/// image. Errors: neither of both; a rectangle that is empty or outside; a file of another size;
+/// nothing left.
+[[nodiscard]] Expected<cv::Mat> make_mask(const std::vector<std::string>& parts, cv::Size size);
+
+/// The camera's poses, also of EuRoC's file, whose poses are the body's: T_BS of the camera file
+/// says how the camera sits on it; without one, of ../cam0/sensor.yaml. Errors: those of
+/// read_pose_file; EuRoC's without T_BS.
+[[nodiscard]] Expected<PoseFile> read_truth(
+    const std::filesystem::path& file, const std::optional<std::filesystem::path>& camera_file);
+
+/// Error: fewer than two pairs, which the spans of time may explain. `owner`: of the times.
+[[nodiscard]] Status check_pairs(const std::filesystem::path& truth_file,
+                                 std::span<const double> truth_s,
+                                 const std::string& owner,
+                                 std::span<const double> times_s,
+                                 const TimePairs& pairs,
+                                 double tolerance_s);
+
+/// The poses that frames have: by their times where the file has times, else one per frame, from
+/// pose `begin` on. Errors: fewer than two of these times; fewer poses than frames.
+[[nodiscard]] Expected<GroundTruth> match_frames(const PoseFile& truth,
+                                                 const std::filesystem::path& truth_file,
+                                                 std::size_t begin,
+                                                 const std::vector<double>& times_s,
+                                                 double tolerance_s);
 
 }  // namespace stemvo::dataset

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "dataset/ground_truth.hpp"
 
 #include <numeric>
 

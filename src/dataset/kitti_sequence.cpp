@@ -8,7 +8,6 @@
 #include "dataset/frame_files.hpp"
 #include "dataset/frame_source.hpp"
 #include "dataset/kitti_text.hpp"
-#include "dataset/mask.hpp"
 #include "io/image_file.hpp"
 #include "odometry/check_frame.hpp"
 #include "text/text_file.hpp"

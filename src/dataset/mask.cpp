@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "dataset/mask.hpp"
-
 #include <algorithm>
 #include <optional>
 
 #include <fmt/format.h>
 
+#include "dataset/frame_files.hpp"
 #include "io/image_file.hpp"
 #include "text/text_file.hpp"
 #include "try.hpp"

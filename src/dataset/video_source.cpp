@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "dataset/frame_files.hpp"
-#include "dataset/ground_truth.hpp"
 #include "try.hpp"
 
 namespace stemvo::dataset {

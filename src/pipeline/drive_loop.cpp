@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "pipeline/drive_loop.hpp"
-
 #include <bit>
 #include <cerrno>
 #include <chrono>
@@ -14,6 +12,7 @@
 
 #include "evaluation/trajectory.hpp"
 #include "pipeline/frame_pipeline.hpp"
+#include "pipeline/result_files.hpp"
 #include "report/frame_image.hpp"
 #include "report/frames_csv.hpp"
 #include "timing/stage_timer.hpp"

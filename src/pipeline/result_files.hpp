@@ -13,7 +13,7 @@
 #include "pipeline/beside_frames.hpp"
 #include "pipeline/drive_video.hpp"
 #include "pipeline/run.hpp"
-#include "report/small_frames.hpp"
+#include "report/run_page.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::pipeline {
@@ -50,6 +50,11 @@ struct Drive {
   bool interrupted = false;
   Status written;  ///< of frames.csv and the images
 };
+
+/// Takes a run's frames through the odometry and keeps what each brings. Rows of frames.csv,
+/// trajectory_kitti.txt and trajectory_tum.txt grow on the disk meanwhile: a run that is killed
+/// loses less than two seconds.
+[[nodiscard]] Drive run_drive(const Run& run, const RunProgress& progress);
 
 /// " for 11 of 12 frames", and why not for the others.
 [[nodiscard]] std::string count_matched(const RunRequest& request,

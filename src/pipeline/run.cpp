@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
-#include "pipeline/drive_loop.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "dataset/frame_files.hpp"
-#include "dataset/ground_truth.hpp"
 #include "report/metrics_json.hpp"
 #include "text/text_table.hpp"
 #include "try.hpp"

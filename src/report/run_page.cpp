@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "report/run_page.hpp"
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "evaluation/pose_file.hpp"
+#include "report/frame_image.hpp"
 #include "report/metrics_json.hpp"
 
 namespace stemvo {
@@ -29,6 +31,23 @@ Json segments_json(const RunPage& run) {
 }
 
 }  // namespace
+
+void SmallFrames::add(std::size_t row, std::size_t number, const cv::Mat& image) {
+  constexpr int kWidth_px = 320;
+  if (row % step_ != 0 || image.empty()) {
+    return;
+  }
+  images_.push_back({fmt::format("frame {}", number), encode_jpeg(image, kWidth_px), row});
+  num_bytes_ += images_.back().jpeg.size();
+  while (num_bytes_ > max_bytes_ && images_.size() > 1) {
+    step_ *= 2;
+    std::erase_if(images_, [this](const auto& kept) { return kept.row % step_ != 0; });
+    num_bytes_ = 0;
+    for (const html::CaptionedImage& kept : images_) {
+      num_bytes_ += kept.jpeg.size();
+    }
+  }
+}
 
 Status write_run_page(const std::filesystem::path& file, const RunPage& run) {
   Json content = {{"page", "run"},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "dataset/mask.hpp"
+#include "dataset/frame_files.hpp"
 #include "geometry/distortion.hpp"
 #include "odometry/frame_view.hpp"
 #include "support/test.hpp"

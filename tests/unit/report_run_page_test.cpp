@@ -3,7 +3,6 @@
 
 #include "evaluation/pose_file.hpp"
 #include "report/run_page.hpp"
-#include "report/small_frames.hpp"
 #include "support/report_content.hpp"
 #include "support/test.hpp"
 #include "text/text_file.hpp"
