@@ -22,7 +22,7 @@ enum class TrackingResolution {
 /// Keys `stem.*`: the filter channel a frame is seen through.
 struct StemOptions {
   /// `default` or `paper`, which are built in; the path of an .onnx file that says its kernel,
-  /// stride and padding in its metadata (tools/export_stem.py writes them); or one made by hand, to
+  /// stride and padding in its metadata (`stemvo-lab export` writes them); or one made by hand, to
   /// compare with: `gray`, `input_layer` (filters 0, 1, 2 = R, G, B), `log` (Laplacian of
   /// Gaussian), `census` (gray levels against their surroundings').
   std::string model = "default";
