@@ -58,7 +58,7 @@ def resampled(landed: Sequence[Landed], seed: int = 0) -> np.ndarray:
 
 
 def row(landed: Sequence[Landed]) -> dict[str, tuple[float, float, float]]:
-    """Of one channel under one disturbance: median and 90th percentile in input px, shares of the points found and wrong; each with its
+    """One channel under one disturbance: median and 90th percentile in input px, shares of the points found and wrong; each with its
     interval (5 to 95 %, bootstrap over the frames)."""
     values = np.array([_values(landed), *np.nanpercentile(resampled(landed), [5, 95], axis=0)])
     return dict(zip(("median", "percentile_90", "found", "wrong"), map(tuple, values.T.tolist()), strict=True))

@@ -121,7 +121,7 @@ def export(options):
 
 
 def file_name(name, layer, layers):
-    """Of one of a model's layers, without what a file's name cannot hold."""
+    """One of a model's layers, without the letters that a file's name cannot hold."""
     if len(layers) == 1:
         return name
     plain = [re.sub(r"[^A-Za-z0-9._-]+", "_", other).strip("_") for other in layers]
@@ -130,7 +130,7 @@ def file_name(name, layer, layers):
 
 
 def command_line(options, name):
-    """That makes the same file again: without folders, which differ from machine to machine."""
+    """The command that makes the same file again, without folders, which differ from machine to machine."""
     padding = options.padding if isinstance(options.padding, str) else ",".join(map(str, options.padding))
     words = ["stemvo-lab", "export", options.weights.name, "--out", ".", "--name", name, "--padding", padding]
     for option, value in (("--layers", ",".join(options.layers or [])), ("--filter", options.filter),

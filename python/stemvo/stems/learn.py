@@ -111,7 +111,7 @@ def by_gradient(options, file, said):
 
 
 def command_line(options):
-    """That makes the same file again: without folders, which differ from machine to machine."""
+    """The command that makes the same file again, without folders, which differ from machine to machine."""
     shown = {one.name: getattr(options, one.name) for one in command.params if one.name not in ("drives", "out")}
     return " ".join(["stemvo-lab learn", *(file.name for file in options.drives), "--out models",
                      *(f"--{key.replace('_', '-')} {f'{value:g}' if isinstance(value, float) else value}" for key, value in shown.items() if value is not None)])
