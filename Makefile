@@ -42,7 +42,8 @@ demo: build
 	@tools/demo.sh
 
 test: build lab
-	@tools/setup.sh tex tools
+	@tools/setup.sh tools
+	@tools/setup.sh tex || echo "==> Without tex"
 	@echo "==> Building the tests"
 	@cmake --build --preset release --parallel $(JOBS)
 	@echo "==> Running the tests"
@@ -51,9 +52,9 @@ test: build lab
 test-all: test test-long
 
 # Without one of these groups the tests that need it are skipped.
-test-long:
-	@for group in peers browser root; do tools/setup.sh $$group || echo "==> Without $$group"; done
-	@tools/setup.sh tex docs
+test-long: lab
+	@for group in peers browser root tex; do tools/setup.sh $$group || echo "==> Without $$group"; done
+	@tools/setup.sh docs
 	@echo "==> Running the long tests"
 	@ctest --preset long --parallel $(JOBS); failed=$$?; tools/skipped.sh; exit $$failed
 

@@ -14,8 +14,8 @@ namespace {
 
 constexpr const char* kShippedConfigs = "default, fast, paper";
 
-/// Of the configurations that come with the program: <prefix>/share/stemvo/config of the prefix
-/// that it is installed under, else that of the source tree it was built from.
+/// The program's configurations stand in <prefix>/share/stemvo/config of the prefix that
+/// it is installed under, else that of the source tree it was built from.
 std::filesystem::path config_folder() {
   std::error_code code;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", code);

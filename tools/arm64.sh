@@ -84,8 +84,9 @@ make_wheel() { # make_wheel FOLDER
 }
 
 make_root
+tests=$([[ ${1:-} != test ]] || echo "${2:-}")
 cmake -G Ninja -B "$BUILD" --toolchain cmake/arm64.cmake -D CMAKE_BUILD_TYPE=Release -D ONNXRUNTIME_ROOT=/opt/onnxruntime \
-  -D "STEMVO_UNIT_TESTS=${2:-features_*_test.cpp;unit/geometry_*_test.cpp;unit/stem_*}" -D CMAKE_SKIP_INSTALL_ALL_DEPENDENCY=ON --log-level=WARNING >build/setup/configure-arm64.log 2>&1 || { cat build/setup/configure-arm64.log && exit 1; }
+  -D "STEMVO_UNIT_TESTS=${tests:-features_*_test.cpp;unit/geometry_*_test.cpp;unit/stem_*}" -D CMAKE_SKIP_INSTALL_ALL_DEPENDENCY=ON --log-level=WARNING >build/setup/configure-arm64.log 2>&1 || { cat build/setup/configure-arm64.log && exit 1; }
 cmake --build "$BUILD" --parallel "$(nproc)" --target stemvo_app stemvo_video
 (cd "$BUILD" && cpack -G DEB -D CPACK_DEBIAN_PACKAGE_ARCHITECTURE=arm64 -D CPACK_DEBIAN_PACKAGE_SHLIBDEPS=OFF \
   -D "CPACK_DEBIAN_PACKAGE_DEPENDS=$(cd - >/dev/null && packages_of_libraries)" >cpack.log) || { cat "$BUILD/cpack.log" && exit 1; }

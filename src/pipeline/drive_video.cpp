@@ -13,7 +13,7 @@
 namespace stemvo::pipeline {
 namespace {
 
-/// Of frames in one video, whatever gaps they have.
+/// Frames a second of one video, whatever gaps the recording has.
 double rate_of(const FrameSource& sequence) {
   const auto& times_s = sequence.timestamps_s;
   const double rate_hz = sequence.stream      ? sequence.stream->rate_hz

@@ -16,7 +16,7 @@ namespace stemvo::pipeline {
 /// The video of a run: each frame with its tracks, and beside it the path so far.
 class DriveVideo {
  public:
-  /// Of RunRequest::video; without it nothing is written. Errors: those of dataset::encode_file.
+  /// Writes RunRequest::video; without it nothing. Errors: those of dataset::encode_file.
   [[nodiscard]] static Expected<DriveVideo> create(const RunRequest& request,
                                                    const FrameSource& sequence);
 

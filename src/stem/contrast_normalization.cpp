@@ -119,7 +119,7 @@ TrackingResolution choose_tracking_resolution(TrackingResolution asked,
   if (asked != TrackingResolution::kAuto) {
     return asked;
   }
-  if (method != FeatureMethod::kPatch) {
+  if (method != FeatureMethod::kPatch && method != FeatureMethod::kKlt) {
     return TrackingResolution::kInput;
   }
   return camera.mean_focal_px() >= kLongFocal_px ? TrackingResolution::kHalf

@@ -61,7 +61,7 @@ struct TimedRow {
   std::string rest;      ///< words between blanks
   std::size_t line = 0;  ///< counted from 0
 };
-/// What was read from such a file, at least one row.
+/// The rows of such a file, at least one.
 template <typename Row>
 struct TimedRows {
   std::vector<Row> rows = {};

@@ -16,11 +16,11 @@ enum class Stage {
   kRead,         ///< file and PNG decoder
   kStem,         ///< the filter
   kContrast,     ///< channel to 8-bit image
-  kPyramid,      ///< patch
+  kPyramid,      ///< patch, klt
   kDescription,  ///< orb, sift: descriptors
   kRoadImage,
   kDetection,   ///< corners or keypoints
-  kTracking,    ///< patches, or matching of descriptors
+  kTracking,    ///< patches, klt both ways, or matching of descriptors
   kHomography,  ///< robust estimate
   kEpipolar,    ///< fundamental or essential matrix, robust estimate
   kTwoViewRefinement,

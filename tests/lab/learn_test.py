@@ -127,7 +127,7 @@ def test_tracking_has_the_steeper_slope_in_its_worse_direction(wall):
 
 @pytest.mark.parametrize(("file", "content", "words"), [
     ("sequences/00/depth/000001.npy", b"broken", "000001.npy"), ("sequences/00/calib.txt", b"P0: 1", "calib.txt"),
-    ("poses/00.txt", b"1 2 3", "00.txt"), ("sequences/00/image_2/000002.png", b"broken", "frame 2 unreadable")])
+    ("poses/00.txt", b"1 2 3", "00.txt"), ("sequences/00/image_2/000002.png", b"broken", "000002.png")])
 def test_errors_are_one_line(wall, file, content, words):
     (wall / "drive" / file).write_bytes(content)
     said = learned(wall, "out", code=1)

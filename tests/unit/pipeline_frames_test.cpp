@@ -64,5 +64,33 @@ TEST_F(FramePipeline, GivesTheSamePosesAsOneFrameAfterTheOtherForAnyNumberOfThre
   }
 }
 
+TEST_F(FramePipeline, EndsWithItsVisitorHoweverShortTheRecording) {
+  const auto visited = [&](const char* range, std::size_t last, bool throws) {
+    const FrameSource frames =
+        open_kitti(sequence_, {.frames = parse_frame_range(range).value()}).value();
+    PhasedOdometry piped = odometry();
+    std::size_t num = 0;
+    const auto visit = [&](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) {
+      ++num;
+      if (throws && i == last) {
+        throw std::runtime_error("disk on fire");
+      }
+      return i != last;
+    };
+    if (throws) {
+      EXPECT_THROW(pipeline::run_frames(frames, piped, visit), std::runtime_error);
+    } else {
+      pipeline::run_frames(frames, piped, visit);
+    }
+    return num;
+  };
+  EXPECT_EQ(visited("0:8", 2, false), 3U);
+  EXPECT_EQ(visited("0:8", 0, true), 1U);
+  EXPECT_EQ(visited("0:8", 7, true), 8U);  // the last one is finished after the loops have ended
+  EXPECT_EQ(visited("0:1", 9, false), 1U);
+  EXPECT_EQ(visited("0:2", 9, false), 2U);
+  EXPECT_EQ(visited("0:3", 9, false), 3U);
+}
+
 }  // namespace
 }  // namespace stemvo

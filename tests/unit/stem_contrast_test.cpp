@@ -194,13 +194,15 @@ TEST(Upsampling, AutoGoesByFeaturesAndFocalLength) {
   const auto camera = [](double focal_px) {
     return Camera{focal_px, focal_px, 320, 240, 640, 480};
   };
-  EXPECT_EQ(choose_tracking_resolution(kAuto, FeatureMethod::kPatch, camera(718)), kHalf);
-  EXPECT_EQ(choose_tracking_resolution(kAuto, FeatureMethod::kPatch, camera(500)), kHalf);
-  EXPECT_EQ(choose_tracking_resolution(kAuto, FeatureMethod::kPatch, camera(499)), kInputZoomed);
+  for (const FeatureMethod method : {FeatureMethod::kPatch, FeatureMethod::kKlt}) {
+    EXPECT_EQ(choose_tracking_resolution(kAuto, method, camera(718)), kHalf);
+    EXPECT_EQ(choose_tracking_resolution(kAuto, method, camera(500)), kHalf);
+    EXPECT_EQ(choose_tracking_resolution(kAuto, method, camera(499)), kInputZoomed);
+  }
   EXPECT_EQ(choose_tracking_resolution(kAuto, FeatureMethod::kOrb, camera(718)), kInput);
   EXPECT_EQ(choose_tracking_resolution(kAuto, FeatureMethod::kSift, camera(718)), kInput);
   for (const TrackingResolution asked : {kInput, kInputZoomed, kHalf, kNative}) {
-    EXPECT_EQ(choose_tracking_resolution(asked, FeatureMethod::kPatch, camera(718)), asked);
+    EXPECT_EQ(choose_tracking_resolution(asked, FeatureMethod::kKlt, camera(718)), asked);
     EXPECT_EQ(choose_tracking_resolution(asked, FeatureMethod::kOrb, camera(300)), asked);
   }
 }

@@ -35,7 +35,7 @@ class Lazy(click.Group):
     def invoke(self, ctx):
         try:
             return super().invoke(ctx)
-        except (ValueError, OSError, KeyError) as error:
+        except (ValueError, OSError) as error:
             file, why = getattr(error, "filename", None), getattr(error, "strerror", None)
             raise click.ClickException(f"{file}: expected to be read or written, found: {why}" if file else str(error)) from None
 

@@ -29,7 +29,10 @@ def read_landmarks(file, num_cameras):
 
 def read_result(folder):
     """Nx4x4 world_from_camera as map.ply has them, the landmarks, and what metrics.json says."""
-    said = json.loads((folder / "metrics.json").read_text())
+    try:
+        said = json.loads((folder / "metrics.json").read_text())
+    except ValueError as error:
+        raise ValueError(f"{folder / 'metrics.json'}: expected a result of stemvo run, found: {error}") from error
     adjusted = folder / "trajectory_map_kitti.txt"
     poses, _ = stemvo.read_trajectory(adjusted if adjusted.exists() else folder / "trajectory_kitti.txt")
     points = read_landmarks(folder / "map.ply", len(poses)) if (folder / "map.ply").exists() else (np.zeros((0, 3)), np.zeros((0, 3), np.uint8))

@@ -17,7 +17,7 @@ LUMA = np.array([0.299, 0.587, 0.114])  # share of R, G and B in gray: Rec. 601,
 
 
 class Drive:
-    """Frames of DIR/sequences/00 with DIR/poses/00.txt."""
+    """Frames of DIR/sequences/00 with DIR/poses/00.txt; depth beside them."""
 
     def __init__(self, folder):
         sequence = pathlib.Path(folder) / "sequences/00"
@@ -34,7 +34,8 @@ class Drive:
         """H x W, gray levels 0..255."""
         picture = self._recording[index][0]
         if picture is None or picture.ndim != 3:
-            raise ValueError(f"{self._depth.parent}: expected colour pictures, found frame {index} {'gray' if picture is not None else 'unreadable'}")
+            found = "one that cannot be read" if picture is None else "a gray one"
+            raise ValueError(f"{self._depth.parent}/image_2/{index:06}.png: expected a colour picture, found {found}")
         return np.divide(picture, 255, dtype=np.float32).astype(np.float64) @ (255.0 * LUMA)
 
     def depth(self, index):

@@ -96,7 +96,8 @@ def by_gradient(options, file, said):
     from . import descent, teaching
 
     rng = np.random.default_rng(options.seed)
-    frames = [frame for folder in options.drives for frame in warps.frames_of(str(folder / "sequences/00"), FRAMES)]
+    recordings = [folder / "sequences/00" if (folder / "sequences/00").exists() else folder for folder in options.drives]
+    frames = [frame for recording in recordings for frame in warps.frames_of(str(recording), FRAMES)]
     crops = teaching.collect([*frames, *(teaching.dead_leaves((376, 620), rng) for _ in range(NUM_LEAVES))], options.seed)
     click.echo(f"{len(crops.before)} corners")
     costs = []
