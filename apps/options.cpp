@@ -124,7 +124,7 @@ CLI::Option* add_out_folder(CLI::App& command,
 CLI::Option* add_rate_option(CLI::App& command, std::optional<double>& rate_hz) {
   return command
       .add_option("--rate", rate_hz,
-                  "Of images without times: frames per second, where the camera file has no "
+                  "Of frames without times: frames per second, where the camera file has no "
                   "rate_hz; default 30")
       ->type_name("HZ")
       ->check(in_range(1e-6, 1e5));

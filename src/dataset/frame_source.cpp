@@ -88,8 +88,8 @@ Status check_unused(const FrameSourceRequest& request, bool is_listing, bool is_
     return fail(
         fmt::format("--rate: expected a number from 1e-06 to 100000, found {}", *request.rate_hz));
   }
-  if (request.rate_hz && !is_listing) {
-    return fail(fmt::format("--rate {}: expected images without times, found {}", *request.rate_hz,
+  if (request.rate_hz && !is_listing && !is_stream) {
+    return fail(fmt::format("--rate {}: expected frames without times, found {}", *request.rate_hz,
                             request.sequence_dir.string()));
   }
   return {};

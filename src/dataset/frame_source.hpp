@@ -38,6 +38,7 @@ struct StreamInfo {
   std::function<double(std::size_t)> time_s;  ///< of a frame that was read
   std::function<std::size_t()> num_counted;   ///< frames so far that came without a time
   double rate_hz = 30.0;                      ///< as the container or the camera file says
+  double counted_hz = 30.0;                   ///< of frames without a time
 };
 
 /// True poses of some frames.
@@ -110,7 +111,7 @@ struct FrameSourceRequest : SequenceOptions {
   std::filesystem::path sequence_dir;
   std::optional<std::filesystem::path> camera_file;  ///< in place of the recording's own
   std::optional<std::filesystem::path> times;        ///< of images; else the recording's, or a rate
-  /// Frames per second of images without times; that of a camera file goes before it, 30 behind.
+  /// Frames per second of frames without times; that of a camera file goes before it, 30 behind.
   std::optional<double> rate_hz = std::nullopt;
 };
 

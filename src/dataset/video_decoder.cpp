@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -46,7 +47,10 @@ Expected<WriteFrame> encode_file(const std::filesystem::path& file,
   STEMVO_TRY(check_can_write(file));
   STEMVO_TRY_GET(void* const found, io::load_symbol(kVideoModule, kOpenWriter, "writes videos"));
   WriteFrame write;
-  if (!reinterpret_cast<OpenWriter*>(found)(file.c_str(), rate_hz, size, write)) {
+  // A relative path with a colon would be taken for an address.
+  std::error_code code;
+  const auto whole = std::filesystem::absolute(file, code);
+  if (!reinterpret_cast<OpenWriter*>(found)(whole.c_str(), rate_hz, size, write)) {
     return fail(fmt::format(
         "{}: expected an encoder of H.264, MPEG-4 or MJPEG for {}x{} pixels, FFmpeg found none",
         file.string(), size.width, size.height));

@@ -58,8 +58,10 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   const FrameRangeRequest range = request.frames.value_or(FrameRangeRequest{});
   STEMVO_TRY(check_stream_size(stream->size(), camera.camera, owner));
   STEMVO_TRY_GET(const FrameView view, view_of(camera.camera, *request.camera_file));
+  if (const auto& rate_hz = camera.rate_hz ? camera.rate_hz : request.rate_hz) {
+    stream->set_counted_rate(*rate_hz);
+  }
   STEMVO_TRY(stream->skip(range.begin));
-  stream->set_default_rate(camera.rate_hz.value_or(30.0));
   FrameSource frames;
   frames.kind = stream->is_live() ? "live camera" : "video";
   const auto number = camera_number(owner);
@@ -76,7 +78,8 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                              stream->is_live(),
                              [stream](std::size_t index) { return stream->time_s(index); },
                              [stream] { return stream->num_counted(); },
-                             stream->rate_hz()};
+                             stream->rate_hz(),
+                             stream->counted_hz()};
   frames.given_calibration = request.camera_file;
   frames.camera_height_m = camera.camera_height_m;
   frames.warnings = camera.warnings;

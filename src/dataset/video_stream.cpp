@@ -2,6 +2,9 @@
 #include "dataset/video_stream.hpp"
 
 #include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -15,6 +18,50 @@ namespace stemvo::dataset {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Whether a track of an mp4 or mov asks to be mirrored, which OpenCV takes for a turn. Boxes that
+/// end before `end` are looked through: moov, trak in it, tkhd in it.
+bool is_mirrored(std::istream& file, std::int64_t end, int depth = 0) {
+  const auto read = [&file](int bytes) {
+    std::int64_t number = 0;
+    for (; bytes > 0; --bytes) {
+      number = number << 8 | (file.get() & 0xff);
+    }
+    return number;
+  };
+  for (std::int64_t at = file.tellg(); at >= 0 && at + 8 < end;) {
+    std::int64_t size = file.seekg(at) ? read(4) : 0;
+    char name[4] = {};
+    file.read(name, sizeof(name));
+    size = size == 1 ? read(8) : size == 0 ? end - at : size;
+    if (!file || size < 8 || size > end - at) {
+      return false;
+    }
+    constexpr std::string_view kNames[] = {"moov", "trak", "tkhd"};
+    if (std::string_view(name, sizeof(name)) == kNames[depth]) {
+      if (depth < 2) {
+        if (is_mirrored(file, at + size, depth + 1)) {
+          return true;
+        }
+      } else {
+        constexpr std::int64_t kTimes = 20;  // longer by 12 in version 1
+        const bool is_long = read(1) == 1;
+        file.seekg(3 + kTimes + (is_long ? 12 : 0) + 16, std::ios::cur);
+        double matrix[6];
+        for (double& number : matrix) {
+          number = static_cast<std::int32_t>(read(4));
+        }
+        return matrix[0] * matrix[4] < matrix[1] * matrix[3];
+      }
+    }
+    at += size;
+  }
+  return false;
+}
+
+}  // namespace
+
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& file,
                                                               const cv::Size& size) {
   std::error_code code;
@@ -24,6 +71,13 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& fi
     return fail(fmt::format(
         "{}: expected a video that FFmpeg can decode, found a file it cannot (cut off, damaged, or "
         "no video)",
+        file.string()));
+  }
+  std::ifstream boxes(file, std::ios::binary);
+  if (is_mirrored(boxes, static_cast<std::int64_t>(fs::file_size(file, code)))) {
+    return fail(fmt::format(
+        "{}: expected a video that players do not mirror, found a track that asks for it; "
+        "'ffmpeg -i IN OUT.mp4' writes frames as players show them",
         file.string()));
   }
   return std::make_shared<VideoStream>(std::move(decoder), file.string(), false);
@@ -62,7 +116,8 @@ std::size_t VideoStream::expected_frames() const {
 
 double VideoStream::rate_hz() const {
   const double told_hz = decoder_->rate_hz();
-  return told_hz > 0.0 ? told_hz : default_rate_hz_;
+  constexpr double kMax_hz = 1000.0;  // above it is FFmpeg's clock, of short raw MJPEG
+  return told_hz > 0.0 && told_hz <= kMax_hz ? told_hz : counted_hz_.value_or(30.0);
 }
 
 double VideoStream::next_time_s() {
@@ -77,7 +132,7 @@ double VideoStream::next_time_s() {
     return told_s;
   }
   ++num_counted_;
-  return last_time_s_ ? *last_time_s_ + 1.0 / rate_hz() : 0.0;
+  return last_time_s_ ? *last_time_s_ + 1.0 / counted_hz() : 0.0;
 }
 
 bool VideoStream::grab() {

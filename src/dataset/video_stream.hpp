@@ -44,8 +44,9 @@ class VideoStream {
   /// As the container says, which may be wrong; 0: it does not say.
   [[nodiscard]] std::size_t expected_frames() const;
   [[nodiscard]] double rate_hz() const;
-  /// Frames per second where the container says none.
-  void set_default_rate(double rate_hz) { default_rate_hz_ = rate_hz; }
+  /// Of frames without a time, instead of the container's: FFmpeg makes one up for raw MJPEG.
+  void set_counted_rate(double rate_hz) { counted_hz_ = rate_hz; }
+  [[nodiscard]] double counted_hz() const { return counted_hz_.value_or(rate_hz()); }
 
   /// Frame `index`, counted from 0 behind those skipped: CV_8UC3, RGB; empty behind the last one.
   /// Each is read once; several threads may ask for frames that follow one another, and wait for
@@ -64,7 +65,7 @@ class VideoStream {
   std::unique_ptr<VideoDecoder> decoder_;
   std::string name_;
   bool is_live_ = false;
-  double default_rate_hz_ = 30.0;
+  std::optional<double> counted_hz_;
   std::optional<std::chrono::steady_clock::time_point> started_;
 
   mutable std::mutex mutex_;

@@ -2,6 +2,7 @@
 #include "pipeline/drive_video.hpp"
 
 #include <algorithm>
+#include <bit>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -40,8 +41,16 @@ Expected<DriveVideo> DriveVideo::create(const RunRequest& request, const FrameSo
 }
 
 void DriveVideo::add(const cv::Mat& image, const Trajectory& path, const std::string& unit) const {
+  // Each frame draws the path anew: of a long drive few poses, or it takes longer and longer.
+  constexpr std::size_t kMaxPoses = 2000;
+  const std::size_t step = std::bit_ceil(path.size() / kMaxPoses + 1);
+  Trajectory drawn;
+  for (std::size_t i = 0; i + 1 < path.size(); i += step) {
+    drawn.push_back(path[i]);
+  }
+  drawn.push_back(path.back());
   cv::Mat frame;
-  cv::hconcat(image, draw_path(path, image.rows, unit), frame);
+  cv::hconcat(image, draw_path(drawn, image.rows, unit), frame);
   cv::cvtColor(frame, frame, cv::COLOR_RGB2BGR);
   write_(frame(cv::Rect({0, 0}, size_)));
 }

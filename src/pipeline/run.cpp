@@ -58,9 +58,6 @@ Status prepare_out_folder(const Run& run) {
   if (status && run.request.image_every > 0) {
     status = pipeline::create_out_folder(out / "pictures");
   }
-  if (status && run.request.saved_map) {
-    status = check_can_write(*run.request.saved_map);
-  }
   return status ? write_text_file(out / "config.yaml", pipeline::config_text(run, 0)) : status;
 }
 
@@ -156,14 +153,18 @@ Expected<RunSummary> run_source(RunRequest request,
   inputs.insert(inputs.end(),
                 {request.speeds.value_or(""), request.gyro.value_or(""), request.map.value_or("")});
   const auto lock = pipeline::open_out_folder(request.out_dir, "run", inputs);
-  const Status prepared = lock ? prepare_out_folder(run) : lock.error();
-  if (!prepared) {
-    return prepared.error();
+  if (!lock) {
+    return lock.error();
+  }
+  // Before anything is removed: a wrong name costs no earlier result.
+  if (request.saved_map) {
+    STEMVO_TRY(check_can_write(*request.saved_map));
   }
   if (request.video) {
     STEMVO_TRY(pipeline::check_is_no_input(*request.video, inputs));
     STEMVO_TRY_GET(video, pipeline::DriveVideo::create(request, sequence));
   }
+  STEMVO_TRY(prepare_out_folder(run));
   if (request.measure_times) {
     recorder.emplace();
   }

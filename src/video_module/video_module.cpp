@@ -3,7 +3,9 @@
 #include <cstdlib>
 #include <memory>
 #include <string>
+#include <utility>
 
+#include <opencv2/core/utility.hpp>
 #include <opencv2/videoio.hpp>
 
 #include "dataset/video_decoder.hpp"
@@ -14,46 +16,56 @@ namespace {
 
 class OpenCvDecoder final : public VideoDecoder {
  public:
-  explicit OpenCvDecoder(const cv::VideoCapture& capture) : capture_(capture) {}  // shared
+  OpenCvDecoder(const cv::VideoCapture& capture, int turned_deg)
+      : capture_(capture), turned_deg_(turned_deg) {}  // shared
 
   bool grab() override { return capture_.grab(); }
   cv::Mat retrieve() override {
     cv::Mat bgr;
-    capture_.retrieve(bgr);
+    if (capture_.retrieve(bgr) && turned_deg_ != 0) {
+      cv::rotate(bgr, bgr,
+                 turned_deg_ == 90    ? cv::ROTATE_90_CLOCKWISE
+                 : turned_deg_ == 180 ? cv::ROTATE_180
+                                      : cv::ROTATE_90_COUNTERCLOCKWISE);
+    }
     return bgr;
   }
   cv::Size size() const override {
-    return {static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)),
-            static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT))};
+    cv::Size size(static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)),
+                  static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT)));
+    if (turned_deg_ % 180 != 0) {
+      std::swap(size.width, size.height);
+    }
+    return size;
   }
   double frame_count() const override { return capture_.get(cv::CAP_PROP_FRAME_COUNT); }
   double rate_hz() const override { return capture_.get(cv::CAP_PROP_FPS); }
   double position_ms() const override { return capture_.get(cv::CAP_PROP_POS_MSEC); }
-  double turned_deg() const override {
-    return capture_.get(cv::CAP_PROP_ORIENTATION_AUTO) != 0.0
-               ? capture_.get(cv::CAP_PROP_ORIENTATION_META)
-               : 0.0;
-  }
+  double turned_deg() const override { return turned_deg_; }
 
  private:
   cv::VideoCapture capture_;
+  int turned_deg_ = 0;  ///< clockwise; 0, 90, 180 or 270
 };
 
-cv::VideoCapture open_file(const char* file, const cv::Size& wanted) {
+/// The turn the container asks for, clockwise. We turn frames: OpenCV 4.6 turns them the wrong way
+/// (its issue 22088), and later ones not unless they are asked.
+int asked_turn_deg(cv::VideoCapture& capture) {
+  capture.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
+  const int told_deg = cvRound(capture.get(cv::CAP_PROP_ORIENTATION_META));
+  const bool is_reversed = cv::getVersionMajor() == 4 && cv::getVersionMinor() == 6;
+  const int turn_deg = ((is_reversed ? -told_deg : told_deg) % 360 + 360) % 360;
+  return turn_deg % 90 == 0 ? turn_deg : 0;  // players turn by the other angles, we do not
+}
+
+cv::VideoCapture open_file(const char* file) {
   ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // errors are ours to tell
   // A playlist may name anything: one of this machine no address, one of another no file.
   ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS",
            file[0] == '/' ? "protocol_whitelist;file"
                           : "rtsp_transport;tcp|protocol_whitelist;rtsp,rtp,udp,tcp,tls,http,https",
            1);
-  cv::VideoCapture capture(file, cv::CAP_FFMPEG);
-  // As players show it, but where the calibration is of the sensor's rows and columns.
-  capture.set(cv::CAP_PROP_ORIENTATION_AUTO, 1);
-  const cv::Size turned = OpenCvDecoder(capture).size();
-  if (turned != wanted && cv::Size(turned.height, turned.width) == wanted) {
-    capture.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
-  }
-  return capture;
+  return cv::VideoCapture(file, cv::CAP_FFMPEG);
 }
 
 cv::VideoCapture open_camera(int number, int width_px, int height_px) {
@@ -67,9 +79,17 @@ cv::VideoCapture open_camera(int number, int width_px, int height_px) {
 
 extern "C" __attribute__((visibility("default"))) VideoDecoder* stemvo_open_decoder(
     const char* file, int number, int width_px, int height_px) {
-  const cv::VideoCapture capture = file != nullptr ? open_file(file, {width_px, height_px})
-                                                   : open_camera(number, width_px, height_px);
-  return capture.isOpened() ? std::make_unique<OpenCvDecoder>(capture).release() : nullptr;
+  cv::VideoCapture capture =
+      file != nullptr ? open_file(file) : open_camera(number, width_px, height_px);
+  if (!capture.isOpened()) {
+    return nullptr;
+  }
+  const int turn_deg = file != nullptr ? asked_turn_deg(capture) : 0;
+  const cv::Size wanted(width_px, height_px);
+  auto plain = std::make_unique<OpenCvDecoder>(capture, 0);
+  auto turned = std::make_unique<OpenCvDecoder>(capture, turn_deg);
+  // As players show it, but where the calibration is of the sensor's rows and columns.
+  return (turned->size() != wanted && plain->size() == wanted ? plain : turned).release();
 }
 
 extern "C" __attribute__((visibility("default"))) bool stemvo_open_writer(const char* file,
@@ -90,8 +110,8 @@ extern "C" __attribute__((visibility("default"))) bool stemvo_open_writer(const 
           return true;
         }
         writer->release();  // which tells no errors: a full disk leaves fewer frames, or none
-        constexpr double kMinShare = 0.9;  // containers without a count guess
-        const cv::VideoCapture whole(name, cv::CAP_FFMPEG);
+        constexpr double kMinShare = 0.9;                        // containers without a count guess
+        const cv::VideoCapture whole = open_file(name.c_str());  // with a file's options again
         return whole.isOpened() && whole.get(cv::CAP_PROP_FRAME_COUNT) >= kMinShare * count;
       };
       return true;

@@ -216,11 +216,15 @@ TEST_F(RecordingsRun, AVideoShowsFramesTracksAndPath) {
     }
     EXPECT_EQ(count, kNumFrames);
   }
+  const std::string earlier = poses();
+  EXPECT_THAT(earlier, Not(IsEmpty()));
+  expect_error(run(avi, {"--camera", camera_, "--save-map", folder_ / "none/m.map"}), 1, {"m.map"});
   for (const fs::path& file :
        {fs::path(avi), folder_ / "video.txt", folder_ / "none/video.mp4", image(3)}) {
     expect_error(run(avi, {"--quiet", "--camera", camera_, "--video", file}), 1, {file});
   }
   EXPECT_EQ(read_file(avi), before);
+  EXPECT_EQ(poses(), earlier) << "a wrong name costs no result";
 }
 
 TEST_F(RecordingsRun, WithoutOutResultsAreUnderTheirName) {

@@ -93,14 +93,14 @@ class TestAddress:
         server.shutdown()
         server.server_close()
 
-    def run_on(self, recording, name):
-        done = subprocess.run([PROGRAM, "run", recording, "--camera", self.folder / "camera.yaml", "--out", self.folder / name], capture_output=True, text=True, check=False)
-        return done
+    def run_on(self, recording, name, *more, **where):
+        command = [PROGRAM, "run", recording, "--camera", self.folder / "camera.yaml", "--out", self.folder / name, *more]
+        return subprocess.run(command, capture_output=True, text=True, check=False, **where)
 
     def test_a_video_behind_an_address_is_the_same_video(self):
-        served = self.run_on(f"{self.address}/drive.avi?password=secret", "served_result")
+        served = self.run_on(f"{self.address}/drive.avi?password=secret", "served_result", "--video", "cam:1.mkv", cwd=self.folder)
         assert served.returncode == 0, served.stderr
-        assert "input: video drive" in served.stderr
+        assert "input: video drive" in served.stderr and (self.folder / "cam:1.mkv").stat().st_size > 0
         local = self.run_on(self.folder / "served/drive.avi", "local_result")
         assert local.returncode == 0, local.stderr
         for name in ("trajectory_tum.txt", "trajectory_map_tum.txt"):

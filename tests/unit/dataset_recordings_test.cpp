@@ -178,6 +178,79 @@ TEST_F(Recordings, AVideoIsReadFrameByFrame) {
   EXPECT_TRUE(behind.empty());
 }
 
+TEST_F(Recordings, AVideoIsTurnedAsPlayersDo) {
+  cv::Mat picture(kHeight_px, kWidth_px, CV_8UC3, cv::Scalar::all(40));
+  picture(cv::Rect(0, 0, 32, 24)) = cv::Scalar::all(200);  // no turn looks like another
+  picture(cv::Rect(32, 0, 32, 24)) = cv::Scalar::all(120);
+  const fs::path png = temp_ / "corners.png";
+  cv::imwrite(png.string(), picture);
+  FrameSourceRequest video = request(temp_ / "turned.mp4");
+  test::write_video(video.sequence_dir, 25.0, {png, png});
+  const std::string plain = read_file(video.sequence_dir);
+  const auto with_matrix = [&](std::array<signed char, 4> abcd) {
+    std::string text = plain;
+    constexpr std::size_t kPlaces[] = {0, 4, 12, 16};
+    for (std::size_t i = 0; i < 4; ++i) {
+      const char high = static_cast<char>(abcd[i] < 0 ? -1 : 0);  // numbers of 16.16 bits
+      const char number[] = {high, static_cast<char>(abcd[i]), 0, 0};
+      text.replace(plain.find("tkhd") + 44 + kPlaces[i], 4, number, 4);
+    }
+    (void)temp_.file("turned.mp4", text);
+  };
+  const auto expect_first = [&](const cv::Mat& expected, std::size_t num_warnings) {
+    video.camera_file =
+        temp_.file("turned.yaml", fmt::format("resolution: [{}, {}]\nintrinsics: [60, 61, {}, {}]\n"
+                                              "distortion_model: none\n",
+                                              expected.cols, expected.rows, 0.5 * expected.cols,
+                                              0.5 * expected.rows));
+    const auto source = open_source(video);
+    ASSERT_TRUE(source) << source.error().message;
+    EXPECT_EQ(source->warnings.size(), num_warnings);
+    EXPECT_LT(cv::norm(source->read(0).value(), expected, cv::NORM_L1), 4.0 * 3 * 64 * 48);
+  };
+  with_matrix({1, 0, 0, 1});
+  expect_first(picture, 0);
+  cv::Mat turned;
+  cv::rotate(picture, turned, cv::ROTATE_180);
+  with_matrix({-1, 0, 0, -1});
+  expect_first(turned, 1);
+  cv::rotate(picture, turned, cv::ROTATE_90_COUNTERCLOCKWISE);
+  with_matrix({0, -1, 1, 0});
+  expect_first(turned, 1);
+  cv::rotate(picture, turned, cv::ROTATE_90_CLOCKWISE);
+  with_matrix({0, 1, -1, 0});
+  expect_first(turned, 1);
+  expect_first(picture, 0);  // the camera file's size decides
+  with_matrix({-1, 0, 0, 1});
+  EXPECT_THAT(error_of(video), AllOf(HasSubstr("turned.mp4"), HasSubstr("mirror")));
+}
+
+TEST_F(Recordings, RawMotionJpegIsCountedAtTheGivenRate) {
+  std::string all;
+  for (int i = 0; i < kNumFrames; ++i) {
+    std::vector<unsigned char> jpeg;
+    cv::imencode(".jpg", frame(i), jpeg);
+    all.append(jpeg.begin(), jpeg.end());
+  }
+  FrameSourceRequest video = request(temp_.file("raw.mjpeg", all));
+  const auto times_of = [&](const std::string& more) {
+    video.camera_file = camera(more);
+    const auto source = open_source(video).value();
+    std::vector<double> times_s;
+    for (std::size_t i = 0; i < 3; ++i) {
+      expect_frame(source.read(i), static_cast<int>(i));
+      times_s.push_back(source.time_s(i));
+    }
+    times_s.push_back(source.stream->counted_hz);
+    return times_s;
+  };
+  const auto near = [](double s) { return ::testing::DoubleNear(s, 1e-9); };
+  EXPECT_THAT(times_of(""), ElementsAre(0.0, near(1.0 / 30.0), near(2.0 / 30.0), 30.0));
+  video.rate_hz = 20.0;
+  EXPECT_THAT(times_of(""), ElementsAre(0.0, near(0.05), near(0.1), 20.0));
+  EXPECT_THAT(times_of("rate_hz: 10\n"), ElementsAre(0.0, near(0.1), near(0.2), 10.0));
+}
+
 TEST_F(Recordings, AVideoHasTruthByTimeOrByFrame) {
   FrameSourceRequest video = request(write_video());
   video.camera_file = camera("");
