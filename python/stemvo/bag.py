@@ -31,9 +31,10 @@ IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 ENCODINGS = {"mono8": (np.uint8, 1, (0,)), "8UC1": (np.uint8, 1, (0,)), "mono16": (np.uint16, 1, (0,)), "16UC1": (np.uint16, 1, (0,)),
              "rgb8": (np.uint8, 3, (0, 1, 2)), "bgr8": (np.uint8, 3, (2, 1, 0)), "8UC3": (np.uint8, 3, (2, 1, 0)),
              "rgba8": (np.uint8, 4, (0, 1, 2)), "bgra8": (np.uint8, 4, (2, 1, 0))}
-MODELS = {"plumb_bob": ("radial-tangential", 5), "rational_polynomial": ("radial-tangential", 12),
-          "equidistant": ("equidistant", 4), "fisheye": ("equidistant", 4)}
-RECTIFIED = re.compile(r"(^|[/_])rect(ified)?([/_]|$)")  # image_rect, image_rect_color, color/rect/image
+# Their name of a model: ours, the numbers of coefficients it may have.
+MODELS = {"plumb_bob": ("radial-tangential", (4, 5)), "rational_polynomial": ("radial-tangential", (4, 5, 8, 12)),
+          "equidistant": ("equidistant", (4,)), "fisheye": ("equidistant", (4,))}
+RECTIFIED = re.compile(r"(^|[/_])(rect(ified)?|undist(orted)?)([/_]|$)")  # image_rect, image_rect_color, color/rect/image, image_undistorted
 
 
 class BagError(Exception):
@@ -99,21 +100,40 @@ def camera_yaml(reader, topic):
         if max(info.binning_x, info.binning_y) > 1 or roi.x_offset or roi.y_offset or (roi.width or info.width) != info.width or (roi.height or info.height) != info.height:
             raise BagError(f"{connection.topic}: expected the camera of whole images, found one with binning or a region of interest; see --camera")
         of_projection = [projection[0], 0.0, projection[2], 0.0, projection[5], projection[6]]
+        if RECTIFIED.search(topic) and any(lens) and not projection[0] > 0.0:
+            raise BagError(f"{connection.topic}: expected P, the camera of the rectified images of {topic}, found zeros; see --camera")
         if RECTIFIED.search(topic) and projection[0] > 0.0:
             matrix, lens = of_projection, []
             print(f"{connection.topic}: P without distortion, for {topic} is rectified", file=sys.stderr)
         elif any(lens) and projection[0] > 0.0 and not np.allclose(of_projection, matrix[:6], atol=0.01):
             print(f"warning: {connection.topic}: K and D, for images as the sensor gives them; for rectified ones --camera with P", file=sys.stderr)
-        model, count = MODELS.get(info.distortion_model, (None, 0))
-        if model is None and any(lens) or any(lens[count:]):
+        model, counts = MODELS.get(info.distortion_model, (None, (0,)))
+        lens, more = lens[:counts[-1]], lens[counts[-1]:]
+        if any(more) or any(lens) and len(lens) not in counts:
+            lens += more
             raise BagError(f"{connection.topic}: expected distortion_model plumb_bob or equidistant, found '{info.distortion_model}' of {len(lens)} coefficients; see --camera")
         if any(matrix[i] for i in (1, 3)):
             raise BagError(f"{connection.topic}: expected a camera without skew, found {matrix}; see --camera")
         if not matrix[0] > 0.0:
             raise BagError(f"{connection.topic}: expected a calibrated camera, found focal length {matrix[0]}; see --camera")
         return (f"# {connection.topic}\nresolution: [{info.width}, {info.height}]\nintrinsics: [{matrix[0]}, {matrix[4]}, {matrix[2]}, {matrix[5]}]\n"
-                + (f"distortion_model: {model}\ndistortion_coefficients: {lens[:count]}\n" if any(lens) or (model == "equidistant" and lens) else "distortion_model: none\n"))
+                + (f"distortion_model: {model}\ndistortion_coefficients: {lens}\n" if any(lens) or (model == "equidistant" and lens) else "distortion_model: none\n"))
     raise BagError(f"expected messages of {' or '.join(wanted)}, or --camera FILE, found none")
+
+
+def file_yaml(file, topic):
+    """sensor.yaml of a camera file; of Kalibr's chain the camera whose rostopic is the images'."""
+    text = file.read_text(encoding="utf-8")
+    if not re.search(r"^[\s{]*[\"']?\w+[\"']?\s*:", text, re.MULTILINE):
+        raise BagError(f"{file}: expected a camera file with keys and values (COLMAP's has rows), found none")
+    cameras = re.split(r"^(?=cam\d+:)", text, flags=re.MULTILINE)[1:]
+    if len(cameras) < 2:
+        return text
+    topics = [found.group(1) if (found := re.search(r"^\s+rostopic:\s*[\"']?([^\s\"']+)", camera, re.MULTILINE)) else "" for camera in cameras]
+    wanted = topic.rsplit("/compressed", 1)[0]
+    if topics.count(wanted) != 1:
+        raise BagError(f"{file}: expected one camera with rostopic {wanted}, found {', '.join(filter(None, topics)) or 'none'}; give a file of one camera")
+    return re.sub(r"^cam\d+", "cam0", cameras[topics.index(wanted)])
 
 
 def convert(options, folder):
@@ -123,7 +143,7 @@ def convert(options, folder):
         topic = choose_topic(reader, options.topic)
         camera = folder / "mav0/cam0"
         (camera / "data").mkdir(parents=True)
-        sensor = options.camera.read_text(encoding="utf-8") if options.camera else camera_yaml(reader, topic)
+        sensor = file_yaml(options.camera, topic) if options.camera else camera_yaml(reader, topic)
         (camera / "sensor.yaml").write_text(sensor, encoding="utf-8")
         last_ns, written, left_out = -1, 0, 0
         with (camera / "data.csv").open("w", encoding="utf-8") as table:

@@ -139,7 +139,25 @@ class TestBag:
         assert self.convert(bag, self.out, "--camera", camera)[0] == 0
         assert (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8") == camera.read_text(encoding="utf-8")
 
-    @pytest.mark.parametrize(("kind", "encoding", "topic"), [("bag", "rgb8", "/cam0/image_rect"), ("sqlite3", "rgb8", "/cam0/image_rect_color"), ("mcap", "jpeg", "/cam0/image_rect/compressed")])
+    def test_the_camera_of_a_chain_is_that_of_the_topic(self):
+        bag = self.write("bag", topic="/cam1/image_raw", info=False)
+        chain = self.folder / "camchain.yaml"
+        camera = "cam{0}:\n  intrinsics: [15{0}, 150, 79.5, 59.5]\n  distortion_model: radtan\n  distortion_coeffs: [0, 0, 0, 0]\n  resolution: [160, 120]\n  rostopic: {1}\n"
+        chain.write_text(camera.format(0, "/cam0/image_raw") + camera.format(1, "/cam1/image_raw"), encoding="utf-8")
+        assert self.convert(bag, self.out, "--camera", chain)[0] == 0
+        assert (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8") == camera.format(1, "/cam1/image_raw").replace("cam1:", "cam0:", 1)
+        chain.write_text(camera.format(0, "/left") + camera.format(1, "/right"), encoding="utf-8")
+        other = self.folder / "other"
+        self.expect_error(["camchain.yaml", "/cam1/image_raw", "/left, /right"], bag, other, "--camera", chain)
+        colmap = self.folder / "cameras.txt"
+        colmap.write_text("# Camera list: one line each\n1 PINHOLE 160 120 150 150 80 60\n", encoding="utf-8")
+        self.expect_error(["cameras.txt", "COLMAP"], bag, other, "--camera", colmap)
+
+    def test_rectified_images_without_their_camera_are_refused(self):
+        self.expect_error(["expected P", "/cam0/image_rect"], self.write("bag", topic="/cam0/image_rect"), self.out)
+        self.expect_error(["of 3 coefficients"], self.write("sqlite3", d=np.array([-0.1, 0.02, 0.01])), self.out)
+
+    @pytest.mark.parametrize(("kind", "encoding", "topic"), [("bag", "rgb8", "/cam0/image_rect"), ("bag", "rgb8", "/cam0/image_undistorted"), ("sqlite3", "rgb8", "/cam0/image_rect_color"), ("mcap", "jpeg", "/cam0/image_rect/compressed")])
     def test_a_rectified_topic_has_the_camera_of_p(self, kind, encoding, topic):
         projection = np.array([140.0, 0, 80.5, 0, 0, 141.0, 60.5, 0, 0, 0, 1, 0])
         code, _, told = self.convert(self.write(kind, encoding, topic, p=projection), self.out)
