@@ -135,6 +135,10 @@ void MotionCovariance::adjusted(const Window& window,
 }
 
 Matrix6d MotionCovariance::finish(const Motion& motion) {
+  has_begun_ = has_begun_ || motion.state != FrameState::kNoImage;
+  if (!has_begun_) {
+    return Matrix6d::Zero();
+  }
   const bool goes_on = motion.state == FrameState::kLost || motion.state == FrameState::kNoImage;
   const Matrix6d to_cur = adjoint(motion.prev_from_cur.inverse());
   Matrix6d pose = transformed(prev_pose_, to_cur);  // until now: of the one before

@@ -29,8 +29,7 @@ namespace stemvo {
 /// - The map: what an adjustment at a keyframe moves was an error until then.
 /// - A motion model's share of the pose: what it expects to be wrong.
 /// - A pose that goes on unmeasured: the changes of velocity so far, as a random walk, and the
-/// speed
-///   that was let go.
+///   speed that was let go.
 /// - The camera's principal point; the scale.
 class MotionCovariance {
  public:
@@ -65,7 +64,7 @@ class MotionCovariance {
                 const Camera& camera,
                 double loss_px);
 
-  /// Last, for every frame. Finite, symmetric, positive definite; zero for the first frame.
+  /// Last, for every frame. Finite, symmetric, positive definite; zero up to the first one seen.
   [[nodiscard]] Matrix6d finish(const Motion& motion);
   /// The map was multiplied by `factor` (new units = factor * old units).
   void rescale(double factor);
@@ -74,6 +73,8 @@ class MotionCovariance {
   [[nodiscard]] Matrix6d changes_of_velocity(const Motion& motion) const;
   [[nodiscard]] Matrix6d map_term(FrameState state);
   void learn(const Motion& motion);
+
+  bool has_begun_ = false;  ///< a frame was seen
 
   // The frame before.
   Observations prev_points_;

@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import threading
@@ -50,6 +51,8 @@ class TestStream:
         assert rows[-1]["state"] == "tracking" and len(rows[-1]["step_variances"]) == 6
 
     def test_the_example_reads_them(self):
+        self.drive = shutil.copytree(self.drive, self.folder / "broken")
+        (self.drive / "image_2/000000.png").write_bytes(b"")
         with self.start("--quiet", "--frames", "0:20") as run:
             example = subprocess.run([sys.executable, ROOT / "examples/follow_stream.py"], stdin=run.stdout, capture_output=True, text=True, check=True)
         lines = example.stdout.splitlines()

@@ -123,6 +123,22 @@ TEST(MotionCovariance, IsFiniteAndPositiveDefiniteInEveryState) {
   }
 }
 
+TEST(MotionCovariance, IsZeroUntilAFrameIsSeen) {
+  const DriveTracks drive(30, 0.2, 5);
+  WindowEstimator window(config_without_scale(), drive.camera);
+  PairEstimator pair(config_without_scale(OdometryMode::kTwoFrame), drive.camera);
+  for (Estimator* estimator : {static_cast<Estimator*>(&window), static_cast<Estimator*>(&pair)}) {
+    EstimatorRun run(*estimator, drive);
+    run.add_missing();
+    run.add_missing();
+    run.add_range(2, 12);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ(run.results[i].motion_covariance, Matrix6d::Zero()) << i;
+    }
+    expect_covariances({run.results.begin() + 2, run.results.end()});
+  }
+}
+
 TEST(MotionCovariance, GrowsFromFrameToFrameWhileNothingIsSeenAndOnceMoreAfterwards) {
   const DriveTracks drive(30, 0.2, 5);
   Options options = config_without_scale();
