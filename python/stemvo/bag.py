@@ -164,6 +164,9 @@ def convert(options, folder):
 def opener(options):
     if options.recording is None:
         return None
+    if options.recording.is_file():
+        raise BagError(f"--recording {options.recording}: expected a folder or a pattern of images, found a file; of a video "
+                       f"'ffmpeg -i {options.recording} -fps_mode passthrough FOLDER/%06d.png' makes one, beside --camera")
     import stemvo
 
     return lambda first, count: stemvo.read_recording(options.recording, options.camera, frames=f"{first}:{first + count}")
@@ -173,7 +176,7 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(prog="python -m stemvo.bag", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bag", type=pathlib.Path, help="a .bag file (ROS 1), a folder with metadata.yaml (ROS 2), an .mcap or .db3 file, or the --out of `stemvo run`")
     parser.add_argument("out", type=pathlib.Path, help="the folder to make, of a result the .mcap file; must not exist")
-    parser.add_argument("--recording", type=pathlib.Path, help="of a result: its frames are written too")
+    parser.add_argument("--recording", type=pathlib.Path, help="of a result, as a folder or a pattern of images: its frames are written too")
     parser.add_argument("--topic", help="of the images; default: the only one")
     parser.add_argument("--camera", type=pathlib.Path, help="a camera file in place of the camera_info topic")
     options = parser.parse_args(arguments)

@@ -3,6 +3,7 @@
 
 import csv
 import dataclasses
+import decimal
 import io
 import json
 import pathlib
@@ -101,7 +102,8 @@ def read_frames(folder):
         carried = np.block([[back, -back @ cross(step[:3, 3])], [np.zeros((3, 3)), back]])
         covariance = carried @ covariance @ carried.T + np.diag(variances)
         turned = np.kron(np.eye(2), odom_from_base[:3, :3])
-        frames.append(Frame(round(time_s * 1e9), odom_from_base, map_from_base @ np.linalg.inv(odom_from_base), turned @ covariance @ turned.T,
+        time_ns = round(decimal.Decimal(row["timestamp_s"]) * 10**9) or 1  # tf2 takes a stamp of 0 for the latest
+        frames.append(Frame(time_ns, odom_from_base, map_from_base @ np.linalg.inv(odom_from_base), turned @ covariance @ turned.T,
                             step, variances, seconds))
         last = odom_from_base, time_s
     return first, frames

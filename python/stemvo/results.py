@@ -53,7 +53,9 @@ def _keys(options: _core.Options) -> dict[str, str]:
 
 def _repr_options(options: _core.Options) -> str:
     """What differs from the default."""
-    return f"Options({dict(_keys(options).items() - _keys(_core.Options()).items())})"
+    default = _keys(_core.Options())
+    changed = {key: text for key, text in _keys(options).items() if default[key] != text}
+    return f"Options({changed})"
 
 
 def _reduce(value: Any) -> tuple[Any, ...]:

@@ -249,7 +249,7 @@ class TestResult:
         assert asked == [(7, self.FRAMES)]
         assert set(found) == {"/tf_static", "/landmarks", "/tf", "/odometry", "/camera/image/compressed", "/camera/camera_info"}
         assert self.latched == {"/tf_static", "/landmarks"}
-        times = [round((1.7e9 + self.STEP_S * i) * 1e9) for i in range(self.FRAMES)]
+        times = [1_700_000_000_000_000_000 + 100_000_000 * i for i in range(self.FRAMES)]
         assert [time for time, _ in found["/odometry"]] == times
         for (time_ns, odometry), (_, tf) in zip(found["/odometry"], found["/tf"]):
             i = times.index(time_ns)
@@ -319,10 +319,24 @@ class TestResult:
         with pytest.raises(bag_module.result_bag.ResultError, match="map.ply: expected vertices"):
             self.write()
 
+    def test_images_that_cannot_be_read_are_no_fault_of_a_result(self):
+        subprocess.run([PROGRAM, "synth", self.folder / "drive", "--frames", "12", "--width", "320", "--height", "96"], check=True, capture_output=True)
+        for index in (0, 6):
+            (self.folder / f"drive/sequences/00/image_2/{index:06}.png").write_bytes(b"")
+        self.result = self.folder / "real"
+        subprocess.run([PROGRAM, "run", self.folder / "drive/sequences/00", "--out", self.result, "--quiet"], check=True, capture_output=True)
+        odometry = self.write()["/odometry"]
+        assert len(odometry) == 12 and odometry[0][0] == 1, "a stamp of 0 is no time"
+        covariances = [message.pose.covariance for _, message in odometry]
+        assert np.isfinite(covariances).all() and not covariances[1].any() and covariances[6].any()
+
     def test_the_command_writes_one_file_or_says_why_not(self):
         out = self.folder / "made.mcap"
         with contextlib.redirect_stdout(io.StringIO()) as said:
             assert bag_module.main([str(self.result), str(out)]) == 0
+        with contextlib.redirect_stderr(io.StringIO()) as complaint:
+            assert bag_module.main([str(self.result), str(self.folder / "none.mcap"), "--recording", __file__]) == 1
+        assert "--recording" in complaint.getvalue() and "expected a folder or a pattern of images, found a file" in complaint.getvalue()
         assert said.getvalue() == f"{out}: 4 frames\n" and sorted(file.name for file in self.folder.iterdir()) == ["made.mcap", "result"]
         (self.result / "frames.csv").write_text("frame,timestamp_s\n0,0\n", encoding="utf-8")
         with contextlib.redirect_stderr(io.StringIO()) as complaint:
