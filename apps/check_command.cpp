@@ -2,7 +2,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 #include "commands.hpp"
 #include "console.hpp"
 #include "options.hpp"
+#include "pipeline/out_folder.hpp"
 #include "report/check.hpp"
 #include "report/metrics_json.hpp"
 #include "text/text_file.hpp"
@@ -50,18 +50,18 @@ nlohmann::ordered_json document(const std::vector<ThresholdResult>& results) {
 }
 
 Expected<int> check(CheckArguments& arguments) {
-  STEMVO_TRY_GET(const std::vector<ThresholdResult> results, check_metrics(arguments.request));
-  std::error_code code;
-  if (arguments.junit &&
-      std::filesystem::equivalent(*arguments.junit, arguments.request.metrics, code)) {
-    return fail(fmt::format("--junit {}: expected a file of its own, found the metrics",
-                            arguments.junit->string()));
+  const CheckRequest& request = arguments.request;
+  if (arguments.junit) {
+    STEMVO_TRY(pipeline::check_is_no_input(
+        *arguments.junit,
+        {request.metrics, request.thresholds.value_or(""), request.baseline.value_or("")}));
+    STEMVO_TRY(check_can_write(*arguments.junit));
   }
+  STEMVO_TRY_GET(const std::vector<ThresholdResult> results, check_metrics(request));
   print(format_check_table(results));
   print_json(document(results));
   if (arguments.junit) {
-    STEMVO_TRY(write_text_file(*arguments.junit,
-                               format_junit(results, arguments.request.metrics.string())));
+    STEMVO_TRY(write_text_file(*arguments.junit, format_junit(results, request.metrics.string())));
   }
   for (const ThresholdResult& result : results) {
     if (!result.problem.empty()) {
@@ -86,10 +86,10 @@ void add_options(CLI::App& command, CheckArguments& arguments) {
           "With --baseline: by how much they may; default 5%")
       ->type_name("P%")
       ->check([](const std::string& text) {
-        const auto share = parse_numbers(text.substr(0, text.find('%')), 1);
-        return text.ends_with('%') && share && share->front() >= 0.0
+        const auto share = parse_numbers(text.substr(0, text.size() - 1), 1);
+        return text.ends_with('%') && share && share->front() >= 0.0 && share->front() <= 100.0
                    ? std::string()
-                   : "expected a share as 5%, found " + text;
+                   : "expected a share from 0% to 100%, found " + text;
       })
       ->needs("--baseline");
   add_file_option(command, "--junit", arguments.junit, "Write the bounds as JUnit's XML, too");

@@ -123,7 +123,8 @@ Expected<std::vector<ThresholdResult>> read_baseline(const std::filesystem::path
   if (bounds.empty()) {
     return fail(place + "expected numbers of a run, as metrics.json has them, found none");
   }
-  for (const char* same : {"frames", "alignment"}) {  // else the numbers are not comparable
+  for (const char* same :
+       {"sequence", "frames", "alignment"}) {  // else the numbers are not comparable
     if (baseline.contains(same) && metrics.contains(same) && baseline[same] != metrics[same]) {
       bounds.push_back({same,
                         true,

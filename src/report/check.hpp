@@ -35,7 +35,8 @@ struct ThresholdResult {
 /// offset, ATE, RPE, those of the map) from above and tracked_fraction from below, each by the
 /// tolerance. Problems of one bound (file, and line where there is one): other than min and max,
 /// not a finite number, a key the metrics do not have, a metric that is not a number, a baseline of
-/// other frames or another alignment. Errors: file missing, not JSON, not YAML, no thresholds.
+/// another recording, other frames or another alignment. Errors: file missing, not JSON, not YAML,
+/// no thresholds.
 [[nodiscard]] Expected<std::vector<ThresholdResult>> check_metrics(const CheckRequest& request);
 
 /// False when any bound was passed or has a problem.

@@ -83,6 +83,8 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"calibrate", "x"}, "--out"},
       {{"calibrate", "--out", "o"}, "INPUT"},
       {{"check", "metrics.json"}, "--against"},
+      {{"check", "m", "--baseline", "b", "--tolerance", "200%"}, "0% to 100%, found 200%"},
+      {{"check", "m", "--baseline", "b", "--tolerance", "5%%"}, "found 5%%"},
       {{"runn", "x", "--out", "o"}, "models, found 'runn'"},
   };
   for (const Misuse& misuse : cases) {

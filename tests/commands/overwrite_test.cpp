@@ -21,6 +21,24 @@ TEST_F(Overwrite, CalibrateSparesWhatItReads) {
   }
 }
 
+TEST(OverwriteByCheck, SparesWhatItReads) {
+  const TempFolder folder;
+  const std::string numbers = R"({"t_rel_percent": 1})";
+  write_file(folder / "metrics.json", numbers);
+  write_file(folder / "before.json", numbers);
+  write_file(folder / "limits.yaml", "t_rel_percent: {max: 2}\n");
+  const Words check = {"check",     folder / "metrics.json", "--baseline", folder / "before.json",
+                       "--against", folder / "limits.yaml"};
+  for (const char* name : {"metrics.json", "before.json", "limits.yaml"}) {
+    const std::string before = read_file(folder / name);
+    expect_error(run_stemvo(check, {"--junit", folder / name}), 1,
+                 {name, "expected a file to write that is no input"});
+    EXPECT_EQ(read_file(folder / name), before);
+  }
+  expect_error(run_stemvo(check, {"--junit", folder / "none/junit.xml"}), 1, {"none/junit.xml"});
+  succeeded(run_stemvo(check, {"--junit", folder / "junit.xml"}));
+}
+
 TEST_F(Overwrite, NoCommandTakesAFolderThatIsNotItsOwn) {
   const fs::path mine = folder_ / "mine";
   fs::create_directory(mine);

@@ -176,7 +176,7 @@ TEST(Check, ABaselineBoundsItsErrorsByTheTolerance) {
   EXPECT_TRUE(all_passed(*compare(kBaseline, kBaseline, 0.0)));
 }
 
-TEST(Check, ABaselineOfOtherFramesOrAnotherAlignmentIsAProblem) {
+TEST(Check, ABaselineOfAnotherRecordingOtherFramesOrAnotherAlignmentIsAProblem) {
   EXPECT_THAT(problem_of(compare(R"({"frames": 399, "alignment": "none", "t_rel_percent": 0.1,
       "ate_rmse_m": {"sim3": 1}, "tracked_fraction": 1, "map": {"t_rel_percent": 0}})",
                                  kBaseline)),
@@ -185,6 +185,9 @@ TEST(Check, ABaselineOfOtherFramesOrAnotherAlignmentIsAProblem) {
       "ate_rmse_m": {"sim3": 1}, "tracked_fraction": 1, "map": {"t_rel_percent": 0}})",
                                  kBaseline)),
               HasSubstr(R"(expected "sim3" as in the run, found "none")"));
+  EXPECT_THAT(problem_of(compare(R"({"sequence": "00", "t_rel_percent": 0.1})",
+                                 R"({"sequence": "03", "t_rel_percent": 0.1})")),
+              HasSubstr(R"(sequence: expected "00" as in the run, found "03")"));
   EXPECT_THAT(problem_of(compare(kBaseline, "{}")), HasSubstr("expected numbers of a run"));
 }
 
