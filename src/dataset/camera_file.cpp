@@ -113,6 +113,7 @@ class Reader {
   Expected<CameraFile> read() {
     STEMVO_TRY(collect());
     CameraFile result;
+    result.warnings = warnings_;
     set_body(result.body_from_camera);
     set_size(result.camera);
     set_intrinsics(result.camera);
@@ -144,7 +145,15 @@ class Reader {
     format_ = format_of(root);
     const YAML::Node fisheye = root["fisheye_model"];  // OpenCV's, in place of a name
     is_fisheye_ = fisheye && fisheye.IsScalar() && fisheye.Scalar() != "0";
-    return collect_keys(format_.body == kKalibr.body ? root["cam0"] : root);
+    const bool is_chain = format_.body == kKalibr.body;
+    if (is_chain && root["cam1"]) {
+      const YAML::Node topic = root["cam0"]["rostopic"];
+      warnings_.push_back(fmt::format(
+          "{}: cam0{} is taken of several cameras; for images of another give a file of that one",
+          file_.string(),
+          topic && topic.IsScalar() ? fmt::format(" ({})", one_line(topic.Scalar())) : ""));
+    }
+    return collect_keys(is_chain ? root["cam0"] : root);
   }
   Status collect_keys(const YAML::Node& map) {
     const std::vector<std::string> known = format_.keys();
@@ -285,17 +294,18 @@ class Reader {
         refuse(key, fmt::format("expected 0 or 1, for K is of all pixels, found {}", scalar(key)));
       }
     }
-    if (!has("roi") || !values_.at("roi").IsMap()) {
+    if (!has("roi") || values_.at("roi").IsNull()) {
       return;
     }
     const YAML::Node& roi = values_.at("roi");
-    const auto is_one_of = [&](const char* key, int value) {
-      const YAML::Node& found = roi[key];
-      return !found || !found.IsScalar() || found.Scalar() == "0" ||
-             found.Scalar() == std::to_string(value);
+    const auto is_one_of = [&](std::size_t place, const char* key, int value) {
+      const YAML::Node found = roi.IsMap() ? roi[key] : roi[place];
+      return !found || (found.IsScalar() &&
+                        (found.Scalar() == "0" || found.Scalar() == std::to_string(value)));
     };
-    if (!is_one_of("x_offset", 0) || !is_one_of("y_offset", 0) ||
-        !is_one_of("width", camera.width_px) || !is_one_of("height", camera.height_px)) {
+    if (!(roi.IsMap() || (roi.IsSequence() && roi.size() == 4)) || !is_one_of(0, "x_offset", 0) ||
+        !is_one_of(1, "y_offset", 0) || !is_one_of(2, "width", camera.width_px) ||
+        !is_one_of(3, "height", camera.height_px)) {
       refuse("roi", "expected the whole image, for K is of that, found a part");
     }
   }
@@ -377,6 +387,7 @@ class Reader {
   std::filesystem::path file_;
   Format format_;
   bool is_fisheye_ = false;
+  std::vector<std::string> warnings_;
   std::map<std::string, YAML::Node> values_;  ///< of the camera's keys that are there
   Status status_;
 };

@@ -163,6 +163,12 @@ Expected<SharedKind> vote_on_images(FrameSource& frames) {
     return fail(
         fmt::format("none of {} images can be read; the first: {}", files.size(), first_message));
   }
+  if (const int turn = votes.front().orientation; turn > 1 && turn <= 8) {
+    frames.warnings.push_back(fmt::format(
+        "images: EXIF says that they are to be shown turned or mirrored (orientation {}): rows and "
+        "columns are taken as they are stored, as the camera file has to be of",
+        turn));
+  }
   const auto num_votes = [&](const io::ImageKind& kind) {
     return std::ranges::count_if(votes, [&](const io::ImageKind& other) {
       return other.size == kind.size && other.is_color == kind.is_color;

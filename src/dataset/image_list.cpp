@@ -2,9 +2,12 @@
 #include <algorithm>
 #include <cctype>
 #include <map>
+#include <set>
 #include <string>
 #include <system_error>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <fnmatch.h>
@@ -18,13 +21,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::string_view kDigitCharacters = "0123456789";
+
 /// Each whole number becomes '0', the number of its digits without leading zeros, and these
 /// digits: compared as text, it is compared by its value.
 std::string sort_key(std::string_view name) {
-  constexpr std::string_view kDigits = "0123456789";
   std::string key;
   while (!name.empty()) {
-    const std::size_t length = std::min(name.find_first_not_of(kDigits), name.size());
+    const std::size_t length = std::min(name.find_first_not_of(kDigitCharacters), name.size());
     if (length == 0) {
       key += name.front();
       name.remove_prefix(1);
@@ -50,29 +54,85 @@ std::string name_part(const std::string& pattern) {
 
 /// The numbers in a name, without leading zeros: of "left_007.png" those of "right_007.jpg".
 std::string numbers_of(const fs::path& file) {
+  const std::string stem = file.stem().string();
   std::string numbers;
-  for (const char c : file.stem().string()) {
-    const bool is_digit = std::isdigit(static_cast<unsigned char>(c)) != 0;
-    const bool is_behind_digit = !numbers.empty() && numbers.back() != ' ';
-    if (is_digit ? c != '0' || is_behind_digit : is_behind_digit) {
-      numbers += is_digit ? c : ' ';
-    }
+  for (std::size_t i = stem.find_first_of(kDigitCharacters); i < stem.size();) {
+    const std::size_t end = std::min(stem.find_first_not_of(kDigitCharacters, i), stem.size());
+    i = std::min(stem.find_first_not_of('0', i), end - 1);  // a zero alone stays
+    numbers += stem.substr(i, end - i) + ' ';
+    i = stem.find_first_of(kDigitCharacters, end);
   }
-  return numbers.substr(0, numbers.find_last_not_of(' ') + 1);
+  return numbers;
 }
 
-/// Error: two images of one number, which are two cameras or one picture twice.
+/// A name around its last number: "cam1_", "7" and "" of "cam1_007.png".
+struct NameParts {
+  std::string before;
+  std::string number;  ///< without leading zeros; a decimal one between _ or -: "0.033"
+  std::string behind;
+};
+
+NameParts parts_of(const fs::path& file) {
+  const std::string stem = file.stem().string();
+  const auto start_of = [&](std::size_t end) {
+    return end == 0 ? 0 : stem.find_last_not_of(kDigitCharacters, end - 1) + 1;
+  };
+  const std::size_t end = stem.find_last_of(kDigitCharacters) + 1;
+  std::size_t start = start_of(end);
+  if (start > 1 && stem[start - 1] == '.') {
+    const std::size_t whole = start_of(start - 1);
+    const bool is_apart = whole == 0 || stem[whole - 1] == '_' || stem[whole - 1] == '-';
+    start = whole < start - 1 && is_apart ? whole : start;
+  }
+  const std::string number = stem.substr(start, end - start);
+  return {stem.substr(0, start),
+          number.substr(std::min(number.find_first_not_of('0'), number.size())), stem.substr(end)};
+}
+
+/// The error that two images may be of one time, with a pattern that tells the first from the
+/// other.
+Error one_time(const fs::path& given, const fs::path& file, const fs::path& other) {
+  const NameParts parts = parts_of(file);
+  const NameParts others = parts_of(other);
+  const bool is_named_alike = parts.before == others.before && parts.behind == others.behind;
+  const std::string pattern = is_named_alike
+                                  ? "*" + other.extension().string()
+                                  : parts.before + "*" + parts.behind + file.extension().string();
+  return fail(fmt::format(
+      "{}: expected one image of each number, found {} and {}; a quoted pattern tells which, "
+      "as '{}'",
+      given.string(), file.filename().string(), other.filename().string(),
+      (file.parent_path() / pattern).string()));
+}
+
+/// Error: two images of one number, which are two cameras or one picture twice; or names with the
+/// same last numbers behind several beginnings (cam1_, cam2_), which are as many cameras. Where
+/// there are more beginnings than numbers, they are hours or seconds.
 Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) {
-  std::map<std::string, const fs::path*> seen;
+  struct Group {
+    std::set<std::string> numbers;
+    fs::path first;
+  };
+  std::map<std::string, fs::path> seen;
+  std::map<std::pair<std::string, std::string>, Group> groups;
   for (const fs::path& file : files) {
     const std::string numbers = numbers_of(file);
-    const auto [other, is_new] = seen.emplace(numbers, &file);
+    const auto [other, is_new] = seen.emplace(numbers, file);
     if (!is_new && !numbers.empty()) {
-      return fail(fmt::format(
-          "{}: expected one image of each number, found {} and {}; a quoted pattern tells which, "
-          "as '{}'",
-          given.string(), other->second->filename().string(), file.filename().string(),
-          (file.parent_path() / ("*" + file.extension().string())).string()));
+      return one_time(given, other->second, file);
+    }
+    const NameParts parts = parts_of(file);
+    Group& group = groups[{parts.before, parts.behind}];
+    group.first = group.numbers.empty() ? file : group.first;
+    group.numbers.insert(parts.number);
+  }
+  std::map<std::set<std::string>, std::vector<fs::path>> cameras;
+  for (const auto& [name, group] : groups) {
+    cameras[group.numbers].push_back(group.first);
+  }
+  for (const auto& [numbers, firsts] : cameras) {
+    if (firsts.size() > 1 && numbers.size() >= firsts.size() && numbers.size() > 1) {
+      return one_time(given, firsts[0], firsts[1]);
     }
   }
   return {};

@@ -23,7 +23,7 @@ std::optional<fs::path> if_exists(const fs::path& file) {
 
 /// The listing with the images that a list names, and their times.
 Expected<Listing> read_list(const fs::path& list, double unit_s, Listing listing) {
-  STEMVO_TRY_GET(auto found, read_timed_rows(list, {2}, "a time and an image's name", unit_s));
+  STEMVO_TRY_GET(auto found, read_timed_rows(list, {2}, "a time and an image's name", {}, unit_s));
   listing.note = std::move(found.note);
   for (const TimedRow& row : found.rows) {
     listing.times_s.push_back(row.time_s);

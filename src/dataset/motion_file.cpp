@@ -35,10 +35,12 @@ Eigen::Vector3d rate_at(const std::vector<GyroRow>& rows, double time_s) {
 
 }  // namespace
 
-Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file) {
+Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file,
+                                          const std::optional<std::pair<double, double>>& span_s) {
   constexpr double kSigmaShare = 0.02;
   constexpr double kMinSigma = 0.05;
-  STEMVO_TRY_GET(const auto found, read_timed_rows(file, {2, 3}, "a time, m/s and maybe a sigma"));
+  STEMVO_TRY_GET(const auto found, read_timed_rows(file, {2, 3}, "a time, m/s and maybe a sigma",
+                                                   {.span_s = span_s}));
   TimedRows<SpeedRow> speeds{.rows = {}, .note = found.note};
   for (const TimedRow& row : found.rows) {
     STEMVO_TRY_GET(const auto numbers, numbers_of(row, file));
@@ -53,9 +55,13 @@ Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file) {
   return speeds;
 }
 
-Expected<TimedRows<GyroRow>> read_gyro(const std::filesystem::path& file) {
-  STEMVO_TRY_GET(const auto found,
-                 read_timed_rows(file, {4, 7}, "a time and rad/s about x, y and z"));
+Expected<TimedRows<GyroRow>> read_gyro(const std::filesystem::path& file,
+                                       const std::optional<std::pair<double, double>>& span_s) {
+  constexpr double kMinStep_s = 0.9e-4;
+  STEMVO_TRY_GET(
+      const auto found,
+      read_timed_rows(file, {4, 7}, "a time and rad/s about x, y and z",
+                      {.min_step_s = kMinStep_s, .max_step_s = kMaxGap_s, .span_s = span_s}));
   TimedRows<GyroRow> rates{.rows = {}, .note = found.note};
   for (const TimedRow& row : found.rows) {
     STEMVO_TRY_GET(const auto numbers, numbers_of(row, file));

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -28,12 +29,18 @@ struct GyroRow {
 
 /// Rows `time, m/s` or `time, m/s, sigma`, between commas or blanks, `#` before comments; times in
 /// seconds rise. A row without a sigma has 2 % of its speed, and at least 0.05 m/s. Errors, naming
-/// file and line: unreadable, other rows, a sigma that is not above 0, no row.
-[[nodiscard]] Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file);
+/// file and line: unreadable, other rows, a sigma that is not above 0, no row. `span_s`: first and
+/// last time of the frames, where they are known; it tells the unit of times that are not in
+/// seconds.
+[[nodiscard]] Expected<TimedRows<SpeedRow>> read_speeds(
+    const std::filesystem::path& file,
+    const std::optional<std::pair<double, double>>& span_s = std::nullopt);
 
 /// Rows `time, x, y, z` in rad/s, likewise; or EuRoC's imu0/data.csv, whose comment says [ns], with
 /// the accelerations behind them.
-[[nodiscard]] Expected<TimedRows<GyroRow>> read_gyro(const std::filesystem::path& file);
+[[nodiscard]] Expected<TimedRows<GyroRow>> read_gyro(
+    const std::filesystem::path& file,
+    const std::optional<std::pair<double, double>>& span_s = std::nullopt);
 
 /// Rotation prev_from_cur of the gyro's own axes between two times: rates change evenly from row to
 /// row. nullopt: the rows leave 0.1 s or more of it out.

@@ -169,6 +169,35 @@ void sort_by_time(PoseFile& file) {
   std::sort(times_s.begin(), times_s.end());
 }
 
+Error either_format(const fs::path& file, std::string_view found) {
+  return fail(fmt::format(
+      "{}: expected TUM's rows (seconds, x, y, z, qx, qy, qz, qw) or EuRoC's (nanoseconds, x, y, "
+      "z, qw, qx, qy, qz, .., under a comment with [ns]), found {}",
+      file.string(), found));
+}
+
+/// Error: the usual step of times in order can be none in the format's unit.
+Status check_steps(const fs::path& file, Format format, const std::vector<double>& times_s) {
+  constexpr double kLongest_s = 1e5;
+  constexpr double kShortest_s = 1e-4;
+  if (times_s.size() < 2) {
+    return {};
+  }
+  const double step_s =
+      (times_s.back() - times_s.front()) / static_cast<double>(times_s.size() - 1);
+  if (format == Format::kTum && step_s > kLongest_s) {
+    return either_format(file, fmt::format("times with steps of {:.4g}", step_s));
+  }
+  if (format == Format::kEuroc && step_s < kShortest_s) {
+    return fail(fmt::format(
+        "{}: taken for EuRoC's rows (nanoseconds, x, y, z, qw, qx, qy, qz, ..): expected times in "
+        "nanoseconds, found steps of {:.4g}; TUM's rows (seconds, x, y, z, qx, qy, qz, qw) have 8 "
+        "numbers",
+        file.string(), step_s / 1e-9));
+  }
+  return {};
+}
+
 /// The index of the nearest time of a list in order that is not empty; of equals the first.
 std::size_t nearest(std::span<const double> times_s, double time_s) {
   const auto above = std::lower_bound(times_s.begin(), times_s.end(), time_s);
@@ -192,15 +221,12 @@ Expected<PoseFile> read_pose_file(const fs::path& file) {
   STEMVO_TRY_GET(const std::string text, read_text_file(file));
   const std::optional<Format> format = format_of(text);
   if (!format) {
-    return fail(fmt::format(
-        "{}: expected TUM's rows (seconds, x, y, z, qx, qy, qz, qw) or EuRoC's (nanoseconds, x, y, "
-        "z, qw, qx, qy, qz, .., under a comment with [ns]), found 8 numbers that begin with "
-        "nanoseconds",
-        file.string()));
+    return either_format(file, "8 numbers that begin with nanoseconds");
   }
   Expected<PoseFile> result = parse_rows(file, text, *format);
   if (result) {
     sort_by_time(*result);
+    STEMVO_TRY(check_steps(file, *format, result->timestamps_s));
   }
   return result;
 }

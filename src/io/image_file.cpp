@@ -76,6 +76,37 @@ class JpegDecoder {
 };
 
 /// Sets what the image's values are.
+/// The number that EXIF says in a JPEG; 1 where it says none.
+int exif_orientation(Bytes bytes) {
+  constexpr unsigned kExif = 0x45786966;
+  constexpr unsigned kOrientation = 0x112;
+  const auto number = [&](std::size_t at, std::size_t size, bool is_little = false) {
+    unsigned value = 0;
+    for (std::size_t i = 0; i < size; ++i) {
+      const std::size_t place = at + (is_little ? size - 1 - i : i);
+      value = value << 8U | (place < bytes.size() ? bytes[place] : 0U);
+    }
+    return value;
+  };
+  // Segments: 0xff, a kind, two bytes of length. EXIF is a TIFF's list of 12 bytes each.
+  for (std::size_t at = 2; number(at, 1) == 0xff && number(at + 1, 1) != 0xda;
+       at += 2 + number(at + 2, 2)) {
+    const std::size_t tiff = at + 10;
+    if (number(at + 1, 1) != 0xe1 || number(at + 4, 4) != kExif) {
+      continue;
+    }
+    const bool is_little = number(tiff, 1) == 'I';
+    const std::size_t list = tiff + number(tiff + 4, 4, is_little);
+    for (std::size_t i = 0; i < number(list, 2, is_little); ++i) {
+      const std::size_t entry = list + 2 + 12 * i;
+      if (number(entry, 2, is_little) == kOrientation) {
+        return static_cast<int>(number(entry + 8, 2, is_little));
+      }
+    }
+  }
+  return 1;
+}
+
 void measure_levels(const cv::Mat& image, ImageKind& kind) {
   std::vector<std::size_t> counts(1U << 16U);
   for (int v = 0; v < image.rows; ++v) {
@@ -146,6 +177,7 @@ Expected<ImageKind> read_image_kind(const fs::path& file) {
                                      : decode_image(bytes, file.string(), is_color);
     return image.map([&](const cv::Mat& pixels) {
       ImageKind kind{.size = pixels.size(), .is_color = is_color, .used = std::nullopt};
+      kind.orientation = is_jpeg(bytes) ? exif_orientation(bytes) : 1;
       if (pixels.depth() == CV_16U) {
         measure_levels(pixels, kind);
       }

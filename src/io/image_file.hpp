@@ -26,6 +26,7 @@ struct ImageKind {
   bool is_color = false;
   std::optional<Levels> used;  ///< 16 bits: all but the darkest and brightest thousandth
   int peak = 0;                ///< 16 bits: the largest value
+  int orientation = 1;         ///< a JPEG's, by EXIF: 2 to 8 are to be shown turned or mirrored
 };
 
 /// The levels that these images of 16 bits use: as many bits as the largest value has; less where

@@ -16,11 +16,19 @@ void add_unit(const std::string& note, BesideFrames& beside) {
   }
 }
 
-Status add_speeds(const RunRequest& request, BesideFrames& beside) {
+/// First and last time of the frames; a stream's are not known yet.
+std::optional<std::pair<double, double>> span_of(const FrameSource& sequence) {
+  const auto& times_s = sequence.timestamps_s;
+  return sequence.stream || times_s.empty()
+             ? std::nullopt
+             : std::optional(std::pair(times_s.front(), times_s.back()));
+}
+
+Status add_speeds(const RunRequest& request, const FrameSource& sequence, BesideFrames& beside) {
   if (request.config.scale_choice == ScaleChoice::kGroundTruth) {
     return fail("--speed: expected scale.source none or camera_height, found ground_truth");
   }
-  STEMVO_TRY_GET(const auto found, dataset::read_speeds(*request.speeds));
+  STEMVO_TRY_GET(const auto found, dataset::read_speeds(*request.speeds, span_of(sequence)));
   const auto& rows = found.rows;
   WayInput input(request.config.scale.source);
   for (const dataset::SpeedRow& row : rows) {
@@ -36,7 +44,7 @@ Status add_speeds(const RunRequest& request, BesideFrames& beside) {
 }
 
 Status add_gyro(const RunRequest& request, const FrameSource& sequence, BesideFrames& beside) {
-  STEMVO_TRY_GET(auto found, dataset::read_gyro(*request.gyro));
+  STEMVO_TRY_GET(auto found, dataset::read_gyro(*request.gyro, span_of(sequence)));
   auto& rows = found.rows;
   const auto& camera_from_imu = sequence.camera_from_imu;
   for (dataset::GyroRow& row : rows) {
@@ -76,7 +84,7 @@ std::vector<std::string> BesideFrames::warnings(double first_s, double last_s) c
 Expected<BesideFrames> read_beside_frames(const RunRequest& request, const FrameSource& sequence) {
   BesideFrames beside;
   if (request.speeds) {
-    STEMVO_TRY(add_speeds(request, beside));
+    STEMVO_TRY(add_speeds(request, sequence, beside));
   }
   if (request.gyro) {
     STEMVO_TRY(add_gyro(request, sequence, beside));

@@ -168,26 +168,67 @@ Error fail_at(const fs::path& file, std::size_t index, const Error& error) {
 
 namespace {
 
-/// The times in seconds, where they are ms, us or ns: steps are not longer than this. The unit's
-/// name, unless they are seconds.
-std::string find_unit(std::vector<TimedRow>& rows) {
-  constexpr double kMaxStep_s = 3.0;
+struct Unit {
+  double size_s;
+  const char* name;
+};
+constexpr Unit kUnits[] = {{1.0, "seconds"},
+                           {1e-3, "milliseconds"},
+                           {1e-6, "microseconds"},
+                           {kNanosecond_s, "nanoseconds"}};
+
+/// 0: one row.
+double usual_step(const std::vector<TimedRow>& rows) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < rows.size(); ++i) {
     steps.push_back(rows[i].time_s - rows[i - 1].time_s);
   }
   const auto middle = steps.begin() + std::ssize(steps) / 2;
   std::ranges::nth_element(steps, middle);
-  constexpr std::pair<double, const char*> kUnits[] = {
-      {1.0, ""}, {1e-3, "milliseconds"}, {1e-6, "microseconds"}, {kNanosecond_s, "nanoseconds"}};
-  const auto* unit = std::begin(kUnits);
-  while (!steps.empty() && unit + 1 < std::end(kUnits) && *middle * unit->first > kMaxStep_s) {
-    ++unit;
+  return steps.empty() ? 0.0 : *middle;
+}
+
+/// Times from `first` to `last` and those of the span lie over each other and are of one length,
+/// by less than half the way to the next unit.
+bool is_of_span(double first, double last, const std::pair<double, double>& span_s) {
+  constexpr double kMaxRatio = 30.0;
+  const double length = last - first;
+  const double expected = span_s.second - span_s.first;
+  return first <= span_s.second && last >= span_s.first && length <= kMaxRatio * expected &&
+         expected <= kMaxRatio * length;
+}
+
+/// The unit of times whose rows are not scaled yet. Error: it may be one of two.
+Expected<Unit> find_unit(const std::vector<TimedRow>& rows, const UsualTimes& usual) {
+  const double step = usual_step(rows);
+  const double first = rows.front().time_s;
+  const double last = rows.back().time_s;
+  const auto is_short = [&](const Unit& unit) { return step * unit.size_s <= usual.max_step_s; };
+  for (const Unit& unit : kUnits) {
+    if (is_short(unit) && first * unit.size_s >= 1e9 && last * unit.size_s <= 4e9) {
+      return unit;  // since 1970
+    }
   }
-  for (TimedRow& row : rows) {
-    row.time_s *= unit->first;
+  if (is_short(kUnits[0])) {
+    return kUnits[0];
   }
-  return unit->second;
+  std::vector<Unit> usual_units;
+  std::optional<Unit> of_span;
+  for (const Unit& unit : kUnits) {
+    const bool is_long = unit.size_s == 1.0 || step * unit.size_s >= usual.min_step_s;
+    if (is_long && usual.span_s && !of_span &&
+        is_of_span(first * unit.size_s, last * unit.size_s, *usual.span_s)) {
+      of_span = unit;
+    }
+    if (is_long && is_short(unit)) {
+      usual_units.push_back(unit);
+    }
+  }
+  if (!of_span && usual_units.size() > 1) {
+    return fail(fmt::format("expected times in seconds, found steps of {}, {} or {}", step,
+                            usual_units[0].name, usual_units[1].name));
+  }
+  return of_span.value_or(usual_units.empty() ? std::end(kUnits)[-1] : usual_units[0]);
 }
 
 }  // namespace
@@ -195,6 +236,7 @@ std::string find_unit(std::vector<TimedRow>& rows) {
 Expected<TimedRows<TimedRow>> read_timed_rows(const fs::path& file,
                                               std::initializer_list<std::size_t> counts,
                                               std::string_view form,
+                                              const UsualTimes& usual,
                                               double unit_s) {
   STEMVO_TRY_GET(const auto lines, read_lines(file));
   TimedRows<TimedRow> result;
@@ -218,20 +260,31 @@ Expected<TimedRows<TimedRow>> read_timed_rows(const fs::path& file,
     if (!time) {
       return fail_at(file, i, time.error());
     }
-    const double time_s = unit_s * time->front();
-    if (!rows.empty() && !(time_s > rows.back().time_s)) {
-      return fail_at(
-          file, i,
-          fail(fmt::format("expected a time after {} s, found {} s", rows.back().time_s, time_s)));
+    if (!rows.empty() && !(time->front() > rows.back().time_s)) {
+      return fail_at(file, i,
+                     fail(fmt::format("expected a time after {} s, found {} s",
+                                      unit_s * rows.back().time_s, unit_s * time->front())));
     }
-    rows.push_back({time_s, std::string(rest), i});
+    rows.push_back({time->front(), std::string(rest), i});
   }
   if (rows.empty()) {
     return fail(fmt::format("{}: expected rows of {}, found none", file.string(), form));
   }
-  const std::string unit = unit_s == 1.0 ? find_unit(rows) : "";
-  if (!unit.empty()) {
-    result.note = fmt::format("{}: times are taken for {}, by their steps", file.string(), unit);
+  const bool is_said =
+      unit_s != 1.0 && (rows.size() == 1 || usual_step(rows) * unit_s >= usual.min_step_s);
+  if (!is_said) {
+    const Expected<Unit> unit = find_unit(rows, usual);
+    if (!unit) {
+      return fail(fmt::format("{}: {}", file.string(), unit.error().message));
+    }
+    if (unit->size_s != unit_s) {
+      result.note =
+          fmt::format("{}: times are taken for {}, by their steps", file.string(), unit->name);
+    }
+    unit_s = unit->size_s;
+  }
+  for (TimedRow& row : rows) {
+    row.time_s *= unit_s;
   }
   return result;
 }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "stemvo/error.hpp"
@@ -68,14 +69,24 @@ struct TimedRows {
   std::string note = {};  ///< names the unit that was found by the steps, for people; else empty
 };
 
+/// Which times a file may hold: the unit of them is found by it.
+struct UsualTimes {
+  double min_step_s = 0.9e-3;
+  double max_step_s = 3.0;
+  /// First and last time of what the rows belong to, where it is known.
+  std::optional<std::pair<double, double>> span_s = std::nullopt;
+};
+
 /// Rows of one of these numbers of words, between commas or blanks, `#` before comments; the times
-/// rise, in this unit, or in ns where a comment says [ns]; seconds by default, or, where the usual
-/// step would be over 3 s, what makes it shorter: ms, us or ns. `form` names a row. Errors, with
-/// file and line: unreadable, other rows, no row.
+/// rise, in this unit, or in ns where a comment says [ns]; seconds by default. Where the usual step
+/// cannot be in the unit, it is found, and the note says so: the times are since 1970, or of the
+/// span, or the steps are usual. `form` names a row. Errors, with file and line: unreadable, other
+/// rows, no row, two units by whose steps the times may be.
 [[nodiscard]] Expected<TimedRows<TimedRow>> read_timed_rows(
     const std::filesystem::path& file,
     std::initializer_list<std::size_t> counts,
     std::string_view form,
+    const UsualTimes& usual = {},
     double unit_s = 1.0);
 
 /// Decimal digits alone; nullopt: another text, or too large.

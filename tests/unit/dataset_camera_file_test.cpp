@@ -194,6 +194,7 @@ constexpr const char* kRos =
 
 TEST_F(CameraFileTest, KalibrsChain) {
   const auto file = read_camera_file(folder_.file("camchain.yaml", kKalibr));
+  EXPECT_THAT(file->warnings, ElementsAre(HasSubstr("cam0 (/cam0/image_raw) is taken")));
   EXPECT_EQ(file->camera.fy_px, 191.0);
   EXPECT_EQ(file->camera.height_px, 511);
   EXPECT_EQ(file->camera.distortion, Distortion::kEquidistant);

@@ -3,6 +3,7 @@
 #include "dataset/frame_files.hpp"
 #include "evaluation/pose_file.hpp"
 #include "support/test.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
@@ -81,6 +82,9 @@ TEST_F(DoubtfulInput, PartsOfImagesAndSkewAreRefusedByName) {
   EXPECT_THAT(error_of_camera(good + "binning_x: 2\n"), HasSubstr("binning_x: expected 0 or 1"));
   EXPECT_THAT(error_of_camera(good + "roi: {x_offset: 8, y_offset: 0, height: 0, width: 0}\n"),
               HasSubstr("roi: expected the whole image"));
+  EXPECT_EQ(error_of_camera(good + "roi: [0, 0, 640, 480]\n"), "no error");
+  EXPECT_THAT(error_of_camera(good + "roi: [8, 0, 640, 480]\n"), HasSubstr(":6: roi: expected"));
+  EXPECT_THAT(error_of_camera(good + "roi: 8\n"), HasSubstr("roi: expected the whole image"));
   std::string skewed = good;
   skewed.replace(skewed.find("520, 0"), 6, "520, 3");
   EXPECT_THAT(error_of_camera(skewed), HasSubstr("without skew, found [520, 3, "));
@@ -158,6 +162,41 @@ TEST_F(DoubtfulInput, FramesThatAreThereTwiceAreRefused) {
   fs::remove_all(temp_ / "drive");
   EXPECT_EQ(error_of(write_images({"day1_1.png", "day1_2.png", "day2_1.png", "start.png"})),
             "no error");
+  fs::remove_all(temp_ / "drive");
+  FrameSourceRequest numbered =
+      write_images({"cam1_01.png", "cam1_02.png", "cam2_1.png", "cam2_2.png"});
+  EXPECT_THAT(error_of(numbered), AllOf(HasSubstr("cam2_1.png"), HasSubstr("drive/cam1_*.png'")));
+  numbered.sequence_dir /= "cam1_*.png";
+  EXPECT_EQ(open_source(numbered)->files.size(), 2U);
+  for (const char* format : {"{}.{}.png", "s{}_{}.png"}) {
+    fs::remove_all(temp_ / "drive");
+    std::vector<std::string> seconds;
+    for (int i = 0; i < 6; ++i) {
+      seconds.push_back(fmt::format(fmt::runtime(format), i / 2, i % 2));
+    }
+    EXPECT_EQ(error_of(write_images(seconds)), "no error") << format;
+  }
+}
+
+TEST_F(DoubtfulInput, AnOrientationByExifIsSaid) {
+  const FrameSourceRequest request = write_images({"1.jpg", "2.jpg"});
+  const fs::path first = request.sequence_dir / "1.jpg";
+  const std::string jpeg = read_text_file(first).value();
+  for (const char turn : {'\1', '\3', '\6'}) {
+    const std::string little =
+        std::string("II*\0\x08\0\0\0\1\0\x12\1\3\0\1\0\0\0", 18) + turn + std::string(7, '\0');
+    const std::string exif = std::string(
+                                 "\xff\xe1\0\x22"
+                                 "Exif\0\0",
+                                 10) +
+                             little;
+    ASSERT_TRUE(write_text_file(first, jpeg.substr(0, 2) + exif + jpeg.substr(2)));
+    const auto source = open_source(request);
+    ASSERT_TRUE(source) << message_of(source);
+    EXPECT_EQ(source->warnings.size(), turn == '\1' ? 0U : 1U);
+    EXPECT_TRUE(turn == '\1' || source->warnings[0].find(
+                                    fmt::format("orientation {}", int{turn})) != std::string::npos);
+  }
 }
 
 TEST_F(DoubtfulInput, TimesInOtherUnits) {
@@ -175,6 +214,30 @@ TEST_F(DoubtfulInput, TimesInOtherUnits) {
     EXPECT_EQ(source->notes.size(), *name == '\0' ? 0U : 1U);
     EXPECT_TRUE(source->notes.empty() || source->notes[0].find(name) != std::string::npos) << name;
   }
+}
+
+TEST_F(DoubtfulInput, TimesOfFastCamerasAndOfEurocsLayout) {
+  FrameSourceRequest request = write_images({"1.png", "2.png", "3.png"});
+  const auto open = [&](const std::string& first, const std::string& rest) {
+    request.times = temp_.file("times.txt", first + "0000\n" + first + rest);
+    return open_source(request);
+  };
+  for (const char* rest : {"2000\n", "1000\n"}) {
+    const std::string again = std::string(rest).substr(0, 1) + "500\n";
+    EXPECT_THAT(message_of(open("0", rest + ("0" + again))),
+                HasSubstr("expected times in seconds, found steps of"));
+    EXPECT_NEAR(open("170000000000", rest + ("170000000000" + again))->timestamps_s[0], 1.7e9, 1.0);
+  }
+  fs::create_directories(temp_ / "drive/data");
+  fs::copy(temp_ / "drive/1.png", temp_ / "drive/data/1.png");
+  fs::copy(temp_ / "drive/1.png", temp_ / "drive/data/2.png");
+  fs::copy(*request.camera_file, temp_ / "drive/sensor.yaml");
+  (void)temp_.file("drive/data.csv",
+                   "#timestamp,filename\n1403715273.25,1.png\n1403715273.3,2.png\n");
+  request.times.reset();
+  const auto euroc = open_source(request);
+  EXPECT_THAT(euroc->timestamps_s, ElementsAre(1403715273.25, 1403715273.3));
+  EXPECT_THAT(euroc->notes, ElementsAre(HasSubstr("data.csv: times are taken for seconds")));
 }
 
 TEST_F(DoubtfulInput, SixteenBitsAreStretchedByWhatIsUsed) {
@@ -262,6 +325,10 @@ TEST_F(DoubtfulInput, TrajectoriesBetweenCommas) {
   EXPECT_THAT(read("1700000000500000000,5,6,7,0,0,0,1\n").error().message,
               AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's")));
   EXPECT_TRUE(read("#t [ns]\n1700000000500000000,5,6,7,1,0,0,0\n")->is_of_body);
+  EXPECT_THAT(message_of(read("0,5,6,7,1,0,0,0\n50000000,5,6,7,1,0,0,0\n")),
+              AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's"), HasSubstr("steps of 5e+07")));
+  EXPECT_THAT(message_of(read("1.25,5,6,7,1,0,0,0,9\n1.75,5,6,7,1,0,0,0,9\n")),
+              AllOf(HasSubstr("taken for EuRoC's rows"), HasSubstr("found steps of 0.5")));
 }
 
 }  // namespace

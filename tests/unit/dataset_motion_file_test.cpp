@@ -46,6 +46,31 @@ TEST_F(MotionFile, EurocsTimesAreNanoseconds) {
               HasSubstr("motion.txt: times are taken for microseconds, by their steps"));
 }
 
+TEST_F(MotionFile, UnitsOfFastAndSlowRows) {
+  const auto rows = [](double first, double step, int count, const char* rest) {
+    std::string text;
+    for (int i = 0; i < count; ++i) {
+      text += fmt::format("{:.0f} {}\n", first + step * i, rest);
+    }
+    return text;
+  };
+  const auto gyro_step = [&](double first, double step) {
+    const auto gyro = read_gyro(write(rows(first, step, 9, "1 2 3")));
+    return gyro->rows[3].time_s - gyro->rows[2].time_s;
+  };
+  EXPECT_NEAR(gyro_step(1.7e18, 2.5e6), 0.0025, 1e-5) << "400 Hz in ns";
+  EXPECT_NEAR(gyro_step(0, 2500), 0.0025, 1e-12) << "in us";
+  EXPECT_NEAR(gyro_step(1.7e12, 2), 0.002, 1e-6) << "500 Hz in ms";
+  const auto speed_end = [&](double first, double step, std::pair<double, double> span_s) {
+    return read_speeds(write(rows(first, step, 7, "5")), span_s)->rows.back().time_s;
+  };
+  EXPECT_EQ(speed_end(0, 5, {0, 29}), 30.0);
+  EXPECT_NEAR(speed_end(0, 5000, {0, 29}), 30.0, 1e-9) << "ms";
+  EXPECT_NEAR(speed_end(0, 2000, {0, 0.01}), 0.012, 1e-9) << "500 Hz in us";
+  EXPECT_THAT(speed_error(rows(0, 2000, 7, "5")),
+              HasSubstr("found steps of 2000, milliseconds or microseconds"));
+}
+
 TEST(Gyro, RatesBecomeTheRotationBetweenTwoTimes) {
   std::vector<GyroRow> rows;  // faster and faster about x
   for (int i = 0; i <= 40; ++i) {
