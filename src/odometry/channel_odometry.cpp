@@ -13,6 +13,9 @@
 namespace stemvo {
 namespace {
 
+/// A point that has moved by so much otherwise than expected is still found, pixels of the channel.
+constexpr double kUnexpected_px = 4.0;
+
 StemOptions contrast_options(const Options& options, const Camera& camera) {
   StemOptions contrast = options.stem;
   contrast.tracking_resolution =
@@ -26,7 +29,9 @@ ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera, c
     : given_camera_(camera),
       asks_road_(options.scale.source == ScaleSource::kCameraHeight),
       contrast_(contrast_options(options, camera)),
-      front_end_(create_front_end(options.features)) {
+      front_end_(create_front_end(options.features)),
+      image_turn_(camera),
+      aligns_images_(options.features.method == FeatureMethod::kPatch) {
   front_end_->set_mask(mask);
   if (options.odometry.mode == OdometryMode::kTwoFrame) {
     estimator_ = std::make_unique<PairEstimator>(options, camera);
@@ -82,16 +87,28 @@ void ChannelOdometry::track(Frame frame) {
   tracked_ = std::move(frame);
 }
 
-ImageClue ChannelOdometry::clue_of(const Frame& frame) {
+/// The whole image says where to look when the camera turns otherwise than it did, or than a hint.
+ImageClue ChannelOdometry::clue_of(Frame& frame) {
   const std::optional<Eigen::Quaterniond>& hint = frame.hints.prev_from_cur;
   image_from_tracked_ = image_from_tracked_ && hint
                             ? std::optional<Eigen::Quaterniond>(*image_from_tracked_ * *hint)
                             : std::nullopt;
   ImageClue clue{frame.number, frame.time_s};
-  if (image_from_tracked_) {
+  std::optional<Eigen::Quaterniond> turn = image_from_tracked_;
+  if (frame.has_image() && aligns_images_) {
+    const double interval_s = frame.time_s - std::exchange(last_image_s_, frame.time_s);
+    frame.image_turn = image_turn_.align(*frame.pyramid, interval_s, turn);
+    const bool is_unexpected =
+        frame.image_turn &&
+        frame.image_turn->angularDistance(image_turn_.expected()) * given_camera_.mean_focal_px() >
+            kUnexpected_px * frame.pyramid->channel.map.scale.mean();
+    if (image_turn_.refutes_guess() && (turn || is_unexpected)) {
+      turn = frame.image_turn;
+    }
+  }
+  if (turn) {
     const Eigen::Matrix3d k = given_camera_.matrix();
-    const Eigen::Matrix3d cur_from_prev = image_from_tracked_->conjugate().toRotationMatrix();
-    clue.turn = k * cur_from_prev * k.inverse();
+    clue.turn = k * turn->conjugate().toRotationMatrix() * k.inverse();
   }
   if (frame.has_image()) {
     image_from_tracked_ = Eigen::Quaterniond::Identity();

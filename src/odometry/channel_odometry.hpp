@@ -12,6 +12,7 @@
 #include "features/front_end.hpp"
 #include "odometry/estimator.hpp"
 #include "odometry/frame_clock.hpp"
+#include "odometry/image_turn.hpp"
 #include "stem/stem.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
@@ -70,8 +71,11 @@ class ChannelOdometry {
   std::unique_ptr<FrontEnd> front_end_;
   std::unique_ptr<Estimator> estimator_;
 
-  [[nodiscard]] ImageClue clue_of(const Frame& frame);
+  [[nodiscard]] ImageClue clue_of(Frame& frame);
 
+  ImageTurn image_turn_;
+  bool aligns_images_;  ///< for the front end that asks for turns
+  double last_image_s_ = 0.0;
   int num_tracked_ = 0;
   std::vector<double> times_s_;
   FrameClock clock_;  ///< of the frames tracked

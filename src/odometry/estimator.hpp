@@ -40,6 +40,8 @@ struct Frame {
   std::shared_ptr<const ImagePyramid> pyramid;  ///< of the channel: where points are tracked
   std::shared_ptr<const RoadImage> road;        ///< null: the road is not asked
   Matches matches;                              ///< none on the first image
+  /// prev_from_cur from the last image, by the whole of both (ImageTurn). nullopt: not known.
+  std::optional<Eigen::Quaterniond> image_turn = std::nullopt;
   StageTimes times;
   std::string problem;  ///< why the stem gave no channel, else empty
 };

@@ -94,10 +94,12 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
     is_still = is_stationary(moving_points_, now, min_flow_px(), options_.min_inliers);
   }
   const SeenLandmarks seen = find_seen_landmarks(window_, now);
-  const Rigid3 start =
-      frame.hints.prev_from_cur
-          ? nearer_pose(predict(), predict(frame.hints.prev_from_cur), seen, camera())
-          : predict();
+  Rigid3 start = predict();
+  // An image that is missing before this one: its turn is of more than one frame.
+  const auto image_turn = last_.frame == frame.number - 1 ? frame.image_turn : std::nullopt;
+  for (const auto& turn : {frame.hints.prev_from_cur, image_turn}) {
+    start = turn ? nearer_pose(start, predict(turn), seen, camera()) : start;
+  }
   const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
   if (found.has_value()) {
     return accept_localization(frame, found->world_from_camera, is_still, localized);
