@@ -108,21 +108,21 @@ std::vector<Descriptor> describe(const ChannelImage& channel,
   return descriptors;
 }
 
-std::span<const Descriptor> ScaledDescriptors::other(std::size_t i) {
-  if (!describe_at_) {
-    return at_one_;
+std::span<const Descriptor> LookDescriptors::other(std::size_t i) {
+  if (!describe_as_) {
+    return as_is_;
   }
   if (others_[i].empty()) {
-    others_[i] = describe_at_(kOtherScales[i]);
+    others_[i] = describe_as_(kOtherLooks[i]);
   }
   return others_[i];
 }
 
-std::span<const Descriptor> ScaledDescriptors::for_magnification(double magnification) {
+std::span<const Descriptor> LookDescriptors::for_magnification(double magnification) {
   const auto off = [&](double scale) { return std::abs(std::log(scale * magnification)); };
   const auto* const best = std::ranges::min_element(kOtherScales, {}, off);
   return off(*best) < off(1.0) ? other(static_cast<std::size_t>(best - kOtherScales.begin()))
-                               : at_one_;
+                               : as_is_;
 }
 
 std::vector<DescriptorPair> match_descriptors(std::span<const Descriptor> first,

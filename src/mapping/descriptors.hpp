@@ -31,30 +31,41 @@ inline constexpr Descriptor kNoDescriptor{};
                                                double roll_rad,
                                                double scale = 1.0);
 
-/// A view from farther off looks like a smaller one: a frame is described at these scales, too,
-/// where nothing tells how far it is from what was seen.
+/// A frame is described in these ways, too, where nothing tells how it lies to what was seen: a
+/// view from farther off looks like a smaller one, and the axes of a map that begins after a loss
+/// are rolled against those of the map before.
+struct OtherLook {
+  double scale;
+  double roll_rad;
+};
 inline constexpr std::array<double, 2> kOtherScales{0.7, 1.4};
+inline constexpr std::array<OtherLook, 6> kOtherLooks{{{kOtherScales[0], 0.0},
+                                                       {kOtherScales[1], 0.0},
+                                                       {1.0, -0.2},
+                                                       {1.0, 0.2},
+                                                       {1.0, -0.4},
+                                                       {1.0, 0.4}}};
 
-/// Makes a frame's descriptors at a scale.
-using DescribeAt = std::function<std::vector<Descriptor>(double scale)>;
+/// Makes a frame's descriptors in another way.
+using DescribeAs = std::function<std::vector<Descriptor>(const OtherLook& look)>;
 
-/// A frame's descriptors at each scale, made when they are asked for.
-class ScaledDescriptors {
+/// A frame's descriptors in each way, made when they are asked for.
+class LookDescriptors {
  public:
-  /// `at_one`: at scale 1. Without `describe_at` there are no others.
-  ScaledDescriptors(std::span<const Descriptor> at_one, const DescribeAt& describe_at)
-      : at_one_(at_one), describe_at_(describe_at) {}
+  /// Without `describe_as` there are no others than `as_is`.
+  LookDescriptors(std::span<const Descriptor> as_is, const DescribeAs& describe_as)
+      : as_is_(as_is), describe_as_(describe_as) {}
 
-  [[nodiscard]] std::span<const Descriptor> at_one() const { return at_one_; }
-  /// At kOtherScales[i].
+  [[nodiscard]] std::span<const Descriptor> as_is() const { return as_is_; }
+  /// As kOtherLooks[i].
   [[nodiscard]] std::span<const Descriptor> other(std::size_t i);
   /// The scale's descriptors that are nearest to a view which this one magnifies.
   [[nodiscard]] std::span<const Descriptor> for_magnification(double magnification);
 
  private:
-  std::span<const Descriptor> at_one_;
-  DescribeAt describe_at_;
-  std::array<std::vector<Descriptor>, kOtherScales.size()> others_;
+  std::span<const Descriptor> as_is_;
+  DescribeAs describe_as_;
+  std::array<std::vector<Descriptor>, kOtherLooks.size()> others_;
 };
 
 /// Bits that differ; inside of what is compiled for a processor that counts bits, it does.

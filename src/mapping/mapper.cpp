@@ -129,8 +129,9 @@ void Mapper::begin_lookup(const WindowView& view) {
     KeptKeyframe& keyframe = work.keyframe;
     keyframe.descriptors = describe(image->channel, keyframe.corners, roll);
     work.loop = recognizer_.recognize(
-        keeper_.map(), keeper_.components(), work.node, keyframe,
-        [&](double scale) { return describe(image->channel, keyframe.corners, roll, scale); });
+        keeper_.map(), keeper_.components(), work.node, keyframe, [&](const OtherLook& look) {
+          return describe(image->channel, keyframe.corners, roll + look.roll_rad, look.scale);
+        });
     if (work.loop.has_value()) {
       measure_scale(keeper_.keyframe(work.loop->from), keyframe, *work.loop);
     }
@@ -286,7 +287,9 @@ std::optional<Relocation> Mapper::locate(const WindowView& view,
   const double roll = image_roll_rad(keeper_.map_from_world().rotation * predicted.rotation);
   const auto found = recognizer_.locate(
       keeper_.map(), view.camera, corners, describe(image.channel, corners, roll),
-      [&](double scale) { return describe(image.channel, corners, roll, scale); });
+      [&](const OtherLook& look) {
+        return describe(image.channel, corners, roll + look.roll_rad, look.scale);
+      });
   if (!found.has_value()) {
     return std::nullopt;
   }

@@ -62,8 +62,7 @@ void PlaceIndex::renumber(std::span<const int> numbers) {
 
 /// Each descriptor has one vote, which the places that have its like share.
 STEMVO_INLINE void PlaceIndex::vote_for(std::span<const Descriptor> descriptors,
-                                        std::span<double> votes) const {
-  std::vector<int> voted_by(votes.size(), -1);
+                                        std::span<Votes> votes) const {
   std::vector<std::uint32_t> places;  // that a descriptor votes for
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
     if (descriptors[i] == kNoDescriptor) {
@@ -74,38 +73,37 @@ STEMVO_INLINE void PlaceIndex::vote_for(std::span<const Descriptor> descriptors,
       for (const std::uint32_t index :
            tables_[static_cast<std::size_t>(table)][cell_of(descriptors[i], table)]) {
         const Entry& entry = entries_[index];
-        if (entry.place >= votes.size()) {
-          break;  // entries rise
-        }
-        if (voted_by[entry.place] != static_cast<int>(i) &&
+        Votes& place = votes[entry.place];
+        if (place.counts && place.last_by != static_cast<int>(i) &&
             differing_bits(descriptors[i], entry.descriptor) <= kVoteBits) {
-          voted_by[entry.place] = static_cast<int>(i);
+          place.last_by = static_cast<int>(i);
           places.push_back(entry.place);
         }
       }
     }
     for (const std::uint32_t place : places) {
-      votes[place] += 1.0 / static_cast<double>(places.size());
+      votes[place].num += 1.0 / static_cast<double>(places.size());
     }
   }
 }
 
-void PlaceIndex::vote(std::span<const Descriptor> descriptors, std::span<double> votes) const {
+void PlaceIndex::vote(std::span<const Descriptor> descriptors, std::span<Votes> votes) const {
   vote_for(descriptors, votes);
 }
 #if defined(__x86_64__)
 STEMVO_POPCNT void PlaceIndex::vote_avx2(std::span<const Descriptor> descriptors,
-                                         std::span<double> votes) const {
+                                         std::span<Votes> votes) const {
   vote_for(descriptors, votes);
 }
 #endif
 
 std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> descriptors,
-                                                   int before,
+                                                   const std::function<bool(int keyframe)>& may_be,
                                                    int max_candidates) const {
-  const auto num_places =
-      static_cast<std::uint32_t>(std::ranges::lower_bound(keyframes_, before) - keyframes_.begin());
-  std::vector<double> votes(num_places);
+  std::vector<Votes> votes(keyframes_.size());
+  for (std::size_t place = 0; place < votes.size(); ++place) {
+    votes[place].counts = may_be(keyframes_[place]);
+  }
 #if defined(__x86_64__)
   uses_avx2() ? vote_avx2(descriptors, votes) : vote(descriptors, votes);
 #else
@@ -113,8 +111,8 @@ std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> d
 #endif
   std::vector<PlaceCandidate> best;
   for (std::size_t place = 0; place < votes.size(); ++place) {
-    if (votes[place] > 0.0) {
-      best.push_back({keyframes_[place], votes[place]});
+    if (votes[place].num > 0.0) {
+      best.push_back({keyframes_[place], votes[place].num});
     }
   }
   const auto is_better = [](const PlaceCandidate& a, const PlaceCandidate& b) {

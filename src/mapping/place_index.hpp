@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -26,10 +27,12 @@ class PlaceIndex {
   void add(int keyframe, std::span<const Descriptor> descriptors);
   /// Keyframes have new numbers: that of each old one.
   void renumber(std::span<const int> numbers);
-  /// The places of numbers below `before` with the most votes, at most so many, best first.
-  [[nodiscard]] std::vector<PlaceCandidate> candidates(std::span<const Descriptor> descriptors,
-                                                       int before,
-                                                       int max_candidates) const;
+  /// The places among those that `may_be` says by their number with the most votes, at most so
+  /// many, best first.
+  [[nodiscard]] std::vector<PlaceCandidate> candidates(
+      std::span<const Descriptor> descriptors,
+      const std::function<bool(int keyframe)>& may_be,
+      int max_candidates) const;
 
  private:
   static constexpr int kTables = 6;
@@ -40,9 +43,14 @@ class PlaceIndex {
   };
   using Cell = std::vector<std::uint32_t>;  ///< indices into entries_
 
-  void vote_for(std::span<const Descriptor> descriptors, std::span<double> votes) const;
-  void vote(std::span<const Descriptor> descriptors, std::span<double> votes) const;
-  void vote_avx2(std::span<const Descriptor> descriptors, std::span<double> votes) const;
+  struct Votes {
+    double num = 0.0;
+    int last_by = -1;  ///< number of a descriptor
+    bool counts = true;
+  };
+  void vote_for(std::span<const Descriptor> descriptors, std::span<Votes> votes) const;
+  void vote(std::span<const Descriptor> descriptors, std::span<Votes> votes) const;
+  void vote_avx2(std::span<const Descriptor> descriptors, std::span<Votes> votes) const;
   [[nodiscard]] std::uint32_t cell_of(const Descriptor& descriptor, int table) const;
 
   std::array<std::array<std::uint8_t, kBits>, kTables> bits_;  ///< the tables' bits

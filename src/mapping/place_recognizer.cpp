@@ -7,6 +7,8 @@
 #include <functional>
 #include <iterator>
 #include <limits>
+#include <ranges>
+#include <set>
 
 #include "geometry/median.hpp"
 #include "mapping/expected_views.hpp"
@@ -21,6 +23,11 @@ constexpr int kMinFrames = 5;
 constexpr double kMaxSharedPlace = 0.5;
 /// .. and shows less than this of a kept place.
 constexpr double kSamePlace = 0.2;
+/// One more of a view adds nothing once so many kept places should show so much of the same at
+/// about the same size.
+constexpr std::ptrdiff_t kManyAlike = 4;
+constexpr double kMinAlike = 0.7;
+constexpr double kMaxLogAlike = 0.2;
 /// A place is looked for among those so many lookups before that share no tracks: the window
 /// remembers the others. It forgets those from which the camera went away, and came back: from
 /// there to here is this much of its way.
@@ -78,10 +85,10 @@ PlaceView view_of(const KeptKeyframe& keyframe) {
 }
 
 const KeptKeyframe& keyframe_of(const KeptMap& map, int number) {
-  return map.keyframes[static_cast<std::size_t>(number)];
+  return map.keyframes[slot(number)];
 }
 const Similarity3& pose_of(const KeptMap& map, int number) {
-  return map.map_from_keyframe[static_cast<std::size_t>(number)];
+  return map.map_from_keyframe[slot(number)];
 }
 
 double turn_of(const Similarity3& motion) {
@@ -114,8 +121,9 @@ int PlaceRecognizer::end_of_far() const {
 bool PlaceRecognizer::asks(const KeptKeyframe& keyframe) const {
   return num_lookups_ == 0 ||
          (keyframe.frame - last_frame_ >= kMinFrames &&
-          is_share_below(kMaxShared, num_shared(last_tracks_, track_ids_of(keyframe)),
-                         last_tracks_.size()));
+          (is_joining_ ||
+           is_share_below(kMaxShared, num_shared(last_tracks_, track_ids_of(keyframe)),
+                          last_tracks_.size())));
 }
 
 /// The keyframe is the one that is looked up now.
@@ -129,6 +137,7 @@ void PlaceRecognizer::begin_lookup(const KeptKeyframe& keyframe) {
   ++num_lookups_;
   last_pose_ = keyframe.world_from_camera;
   last_frame_ = keyframe.frame;
+  is_joining_ = false;
   last_tracks_ = track_ids_of(keyframe);
   shows_kept_place_ =
       !kept_tracks_.empty() &&
@@ -142,67 +151,76 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
                                                std::span<const int> components,
                                                int number,
                                                const KeptKeyframe& keyframe,
-                                               const DescribeAt& describe_at) {
+                                               const DescribeAs& describe_as) {
   begin_lookup(keyframe);
-  const auto joins = [&](int place) {
-    return components[static_cast<std::size_t>(place)] !=
-               components[static_cast<std::size_t>(number)] &&
-           keyframe_of(map, place).frame >= 0;
-  };
-  // Poses tell the scale of places that they connect.
-  ScaledDescriptors scales(keyframe.descriptors, describe_at);
-  const bool has_others = std::ranges::any_of(places_, [&](const Place& place) {
-    return components[static_cast<std::size_t>(place.keyframe)] !=
-           components[static_cast<std::size_t>(number)];
-  });
-  std::vector<Look> to_check = look_alikes(scales, has_others, end_of_far());
-  std::ranges::copy(expected_looks(map, components, number, keyframe, scales),
-                    std::back_inserter(to_check));
-  const std::size_t num_candidates = to_check.size();
-  for (std::size_t i = 0; i < to_check.size(); ++i) {
-    const Look look = to_check[i];
-    const int place = look.place;
-    if (std::any_of(to_check.begin(), to_check.begin() + static_cast<std::ptrdiff_t>(i),
-                    [&](const Look& other) {
-                      return other.place == place &&
-                             other.expected.has_value() == look.expected.has_value();
-                    })) {
-      continue;
-    }
-    const std::optional<Sighting> sighting = look_at(map, look, number, keyframe);
+  const Question question{map, components, number, keyframe};
+  // Poses tell the scale and the roll of places that they connect.
+  LookDescriptors described(keyframe.descriptors, describe_as);
+  const bool has_others = std::ranges::any_of(
+      places_, [&](const Place& place) { return question.is_elsewhere(place.keyframe); });
+  std::vector<Look> looks =
+      look_alikes(described, has_others, [&](int place) { return is_far(question, place); });
+  std::ranges::copy(expected_looks(question, described), std::back_inserter(looks));
+  std::optional<Loop> found;
+  look_through(std::move(looks), [&](const Look& look) {
+    std::optional<Sighting> sighting = look_at(question, look);
     if (!sighting.has_value()) {
-      continue;
+      return Seen::kNothing;
     }
-    if (is_confirmed(map, *sighting, joins(place))) {
-      sightings_.push_back(*sighting);
+    const bool joins =
+        question.is_elsewhere(look.place) && map.keyframes[slot(look.place)].frame >= 0;
+    if (joins) {
+      share_what_joins(question, *sighting);
+    }
+    const bool is_found = is_confirmed(map, *sighting, joins);
+    is_joining_ = is_joining_ || (joins && !is_found && sighting->share >= kMinJoinShare);
+    if (is_found) {
+      found = sighting->loop;
       if (sighting->share >= kSamePlace) {
         shows_kept_place_ = true;
         kept_tracks_ = last_tracks_;
       }
-      return sighting->loop;
     }
-    sightings_.push_back(*sighting);
-    if (i < num_candidates) {
-      for (const int neighbour : neighbours_of(place)) {
-        to_check.push_back({neighbour, look.seen, {}});
+    sightings_.push_back(std::move(*sighting));
+    return is_found ? Seen::kEnough : Seen::kSomething;
+  });
+  return found;
+}
+
+template <typename LookAt>
+void PlaceRecognizer::look_through(std::vector<Look> looks, const LookAt& look_at) const {
+  const std::size_t num_candidates = looks.size();
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    const Look look = looks[i];
+    const auto is_same = [&](const Look& other) {
+      return other.place == look.place && other.expected.has_value() == look.expected.has_value();
+    };
+    if (std::any_of(looks.begin(), looks.begin() + static_cast<std::ptrdiff_t>(i), is_same)) {
+      continue;
+    }
+    const Seen seen = look_at(look);
+    if (seen == Seen::kEnough) {
+      return;
+    }
+    if (seen == Seen::kSomething && i < num_candidates) {
+      for (const int neighbour : neighbours_of(look.place)) {
+        looks.push_back({neighbour, look.seen, {}});
       }
     }
   }
-  return std::nullopt;
 }
 
-std::vector<PlaceRecognizer::Look> PlaceRecognizer::look_alikes(ScaledDescriptors& scales,
-                                                                bool at_all,
-                                                                int before) const {
+std::vector<PlaceRecognizer::Look> PlaceRecognizer::look_alikes(
+    LookDescriptors& described, bool in_all_ways, const std::function<bool(int)>& may_be) const {
   std::vector<std::pair<PlaceCandidate, std::span<const Descriptor>>> found;
   const auto vote = [&](std::span<const Descriptor> seen) {
-    for (const PlaceCandidate& place : index_.candidates(seen, before, kMaxCandidates)) {
+    for (const PlaceCandidate& place : index_.candidates(seen, may_be, kMaxCandidates)) {
       found.emplace_back(place, seen);
     }
   };
-  vote(scales.at_one());
-  for (std::size_t i = 0; at_all && i < kOtherScales.size(); ++i) {
-    vote(scales.other(i));
+  vote(described.as_is());
+  for (std::size_t i = 0; in_all_ways && i < kOtherLooks.size(); ++i) {
+    vote(described.other(i));
   }
   std::ranges::stable_sort(found, std::greater<>(),
                            [](const auto& one) { return one.first.votes; });
@@ -216,37 +234,43 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::look_alikes(ScaledDescriptor
   return looks;
 }
 
-/// Places of the same map that the camera has come back to, by the poses.
-std::vector<PlaceRecognizer::Look> PlaceRecognizer::expected_looks(
-    const KeptMap& map,
-    std::span<const int> components,
-    int number,
-    const KeptKeyframe& keyframe,
-    ScaledDescriptors& scales) const {
-  const auto component_of = [&](int node) { return components[static_cast<std::size_t>(node)]; };
+/// Places of the same map that the camera has come back to, by the poses. Where many are kept that
+/// should show the same, one more would tell nothing new.
+std::vector<PlaceRecognizer::Look> PlaceRecognizer::expected_looks(const Question& question,
+                                                                   LookDescriptors& described) {
   std::vector<int> places;
   for (const Place& place : places_) {
-    if (place.keyframe < end_of_far() && component_of(place.keyframe) == component_of(number) &&
-        has_come_back(map, place, number)) {
+    if (is_far(question, place.keyframe) && !question.is_elsewhere(place.keyframe) &&
+        has_come_back(question.map, place, question.number)) {
       places.push_back(place.keyframe);
     }
   }
-  std::vector<ExpectedView> views = expected_views(map, places, number, keyframe);
+  std::vector<ExpectedView> views =
+      expected_views(question.map, places, question.number, question.keyframe);
+  const auto num_alike = std::ranges::count_if(views, [](const ExpectedView& view) {
+    return view.share >= kMinAlike && std::abs(std::log(view.magnification)) < kMaxLogAlike;
+  });
+  shows_kept_place_ = shows_kept_place_ || num_alike >= kManyAlike;
   views.resize(std::min<std::size_t>(views.size(), kMaxCandidates));
   std::vector<Look> looks;
   for (const ExpectedView& view : views) {
     looks.push_back(
-        {view.place, scales.for_magnification(view.magnification), view.keyframe_from_place});
+        {view.place, described.for_magnification(view.magnification), view.keyframe_from_place});
   }
   return looks;
 }
 
-std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(
-    const KeptMap& map, const Look& look, int number, const KeptKeyframe& keyframe) const {
-  const int place = look.place;
-  const KeptKeyframe& old = keyframe_of(map, place);
-  if (place >= end_of_far() || (num_shared(track_ids_of(old), last_tracks_) > kMaxTracks &&
-                                !has_come_back(map, place_of(place), number))) {
+/// The window remembers places just before in its own map.
+bool PlaceRecognizer::is_far(const Question& question, int place) const {
+  return place < end_of_far() || question.is_elsewhere(place);
+}
+
+std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(const Question& question,
+                                                                  const Look& look) const {
+  const auto& [map, components, number, keyframe] = question;
+  const KeptKeyframe& old = keyframe_of(map, look.place);
+  if (!is_far(question, look.place) || (num_shared(track_ids_of(old), last_tracks_) > kMaxTracks &&
+                                        !has_come_back(map, place_of(look.place), number))) {
     return std::nullopt;
   }
   std::optional<Loop> loop =
@@ -254,7 +278,7 @@ std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(
   if (!loop.has_value()) {
     return std::nullopt;
   }
-  loop->from = place;
+  loop->from = look.place;
   loop->to = number;
   const double share =
       static_cast<double>(loop->corners.size()) / static_cast<double>(keyframe.corners.size());
@@ -266,30 +290,47 @@ bool PlaceRecognizer::has_come_back(const KeptMap& map, const Place& place, int 
   return place.depth > 0.0 && change_of_view(net, place.depth) < kMaxNetWay * (path_ - place.path);
 }
 
+bool PlaceRecognizer::say_the_same(const KeptMap& map, const Sighting& a, const Sighting& b) const {
+  const Similarity3 a_from_b = pose_of(map, a.loop.to).inverse() * pose_of(map, b.loop.to);
+  // The identity, if both are right.
+  const Similarity3 difference = (pose_of(map, a.loop.from) * a.loop.from_to * a_from_b).inverse() *
+                                 pose_of(map, b.loop.from) * b.loop.from_to;
+  return std::abs(std::log(difference.scale)) < kMaxLogScale &&
+         turn_of(difference) < kMaxTurn_rad &&
+         difference.translation.norm() < kMaxShift * (depth_ + a_from_b.translation.norm());
+}
+
+/// How much of the keyframe the places of another map explain together that say the same.
+void PlaceRecognizer::share_what_joins(const Question& question, Sighting& sighting) {
+  std::set<int> explained;
+  std::vector<Sighting*> same = {&sighting};
+  for (Sighting& other : sightings_) {
+    if (other.lookup == sighting.lookup && say_the_same(question.map, other, sighting)) {
+      same.push_back(&other);
+    }
+  }
+  for (const Sighting* one : same) {
+    std::ranges::copy(one->loop.corners | std::views::values,
+                      std::inserter(explained, explained.end()));
+  }
+  for (Sighting* one : same) {
+    one->share = static_cast<double>(explained.size()) /
+                 static_cast<double>(question.keyframe.corners.size());
+  }
+}
+
 /// By another sighting, of another place; of keyframes that were looked up before, too, where two
 /// maps are to be joined.
 bool PlaceRecognizer::is_confirmed(const KeptMap& map, const Sighting& sighting, bool joins) const {
-  const Loop& loop = sighting.loop;
   if (joins && sighting.share < kMinJoinShare) {
     return false;
   }
-  const Similarity3 map_from_camera = pose_of(map, loop.from) * loop.from_to;
   const auto num = std::ranges::count_if(sightings_, [&](const Sighting& other) {
-    const bool is_same_view =
-        other.loop.from == loop.from && (!sighting.was_expected || other.lookup == sighting.lookup);
-    if (is_same_view ||
-        (joins && (other.lookup == sighting.lookup || other.share < kMinJoinShare))) {
-      return false;
-    }
-    const Similarity3 other_from_camera =
-        pose_of(map, other.loop.to).inverse() * pose_of(map, loop.to);
-    // The identity, if both are right.
-    const Similarity3 difference = map_from_camera.inverse() * pose_of(map, other.loop.from) *
-                                   other.loop.from_to * other_from_camera;
-    return std::abs(std::log(difference.scale)) < kMaxLogScale &&
-           turn_of(difference) < kMaxTurn_rad &&
-           difference.translation.norm() <
-               kMaxShift * (depth_ + other_from_camera.translation.norm());
+    const bool is_same_view = other.loop.from == sighting.loop.from &&
+                              (!sighting.was_expected || other.lookup == sighting.lookup);
+    return !is_same_view &&
+           !(joins && (other.lookup == sighting.lookup || other.share < kMinJoinShare)) &&
+           say_the_same(map, other, sighting);
   });
   return num >= (joins ? kMinJoinSightings - 1 : 1);
 }
@@ -317,7 +358,7 @@ void PlaceRecognizer::add(int number, const KeptKeyframe& keyframe) {
 }
 
 void PlaceRecognizer::renumber(std::span<const int> numbers) {
-  const auto number_of = [&](int keyframe) { return numbers[static_cast<std::size_t>(keyframe)]; };
+  const auto number_of = [&](int keyframe) { return numbers[slot(keyframe)]; };
   index_.renumber(numbers);
   for (Place& place : places_) {
     place.keyframe = number_of(place.keyframe);
@@ -333,56 +374,40 @@ std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
                                                     const Camera& camera,
                                                     const std::vector<KeptCorner>& corners,
                                                     const std::vector<Descriptor>& descriptors,
-                                                    const DescribeAt& describe_at) {
+                                                    const DescribeAs& describe_as) {
   const std::vector<Similarity3> before = std::exchange(located_, {});
-  may_be_locating_ = false;
-  ScaledDescriptors scales(descriptors, describe_at);
-  std::vector<Look> to_check = look_alikes(scales, true, static_cast<int>(map.keyframes.size()));
-  const std::size_t num_candidates = to_check.size();
-  for (std::size_t i = 0; i < to_check.size(); ++i) {
-    const Look look = to_check[i];
-    const int place = look.place;
-    const auto end = to_check.begin() + static_cast<std::ptrdiff_t>(i);
-    if (std::ranges::find(to_check.begin(), end, place, &Look::place) != end) {
-      continue;
-    }
-    const KeptKeyframe& old = keyframe_of(map, place);
+  LookDescriptors described(descriptors, describe_as);
+  std::optional<LocatedFrame> located;
+  look_through(look_alikes(described, true, [](int) { return true; }), [&](const Look& look) {
+    const KeptKeyframe& old = keyframe_of(map, look.place);
     const auto found = locate_in_place(view_of(old), {camera, corners, look.seen});
     if (!found.has_value()) {
-      continue;
+      return Seen::kNothing;
     }
-    const Similarity3 map_from_camera = pose_of(map, place) * Similarity3(found->old_from_camera);
-    const auto agrees = [&](const Similarity3& other, double max_turn_rad, double max_shift) {
-      const Similarity3 difference = map_from_camera.inverse() * other;
-      return turn_of(difference) < max_turn_rad &&
-             difference.translation.norm() < max_shift * median_depth(old.corners);
+    const Similarity3 map_from_camera =
+        pose_of(map, look.place) * Similarity3(found->old_from_camera);
+    const auto is_near = [&](double max_turn_rad, double max_shift) {
+      return [&, max_turn_rad, max_shift](const Similarity3& other) {
+        const Similarity3 difference = map_from_camera.inverse() * other;
+        return turn_of(difference) < max_turn_rad &&
+               difference.translation.norm() < max_shift * median_depth(old.corners);
+      };
     };
-    const auto is_same = [&](const Similarity3& other) {
-      return agrees(other, kMaxTurn_rad, kMaxShift);
-    };
-    const auto is_near = [&](const Similarity3& other) {
-      return agrees(other, kMaxMotion_rad, kMaxMotion);
-    };
-    const bool is_certain =
-        std::ranges::any_of(located_, is_same) || std::ranges::any_of(before, is_near);
+    const bool is_certain = std::ranges::any_of(located_, is_near(kMaxTurn_rad, kMaxShift)) ||
+                            std::ranges::any_of(before, is_near(kMaxMotion_rad, kMaxMotion));
     located_.push_back(map_from_camera);
-    if (is_certain) {
-      LocatedFrame located{place, found->old_from_camera, {}};
-      for (const auto& [mine, other] : found->corners) {
-        located.landmarks.emplace_back(
-            corners[static_cast<std::size_t>(other)].track_id,
-            old.corners[static_cast<std::size_t>(mine)].in_camera.cast<double>());
-      }
-      return located;
+    if (!is_certain) {
+      return Seen::kSomething;
     }
-    if (i < num_candidates) {
-      for (const int neighbour : neighbours_of(place)) {
-        to_check.push_back({neighbour, look.seen, {}});
-      }
+    located = {look.place, found->old_from_camera, {}};
+    for (const auto& [mine, other] : found->corners) {
+      located->landmarks.emplace_back(corners[slot(other)].track_id,
+                                      old.corners[slot(mine)].in_camera.cast<double>());
     }
-  }
-  may_be_locating_ = before.empty() && !located_.empty();
-  return std::nullopt;
+    return Seen::kEnough;
+  });
+  may_be_locating_ = !located && before.empty() && !located_.empty();
+  return located;
 }
 
 }  // namespace stemvo

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <utility>
@@ -47,7 +48,7 @@ class PlaceRecognizer {
                                               std::span<const int> components,
                                               int number,
                                               const KeptKeyframe& keyframe,
-                                              const DescribeAt& describe_at = {});
+                                              const DescribeAs& describe_as = {});
   /// The last one that was looked up shows a place that is kept: it needs not become one.
   [[nodiscard]] bool shows_kept_place() const { return shows_kept_place_; }
   /// It becomes a place: its descriptors and corners must stay in the map.
@@ -64,7 +65,7 @@ class PlaceRecognizer {
                                                    const Camera& camera,
                                                    const std::vector<KeptCorner>& corners,
                                                    const std::vector<Descriptor>& descriptors,
-                                                   const DescribeAt& describe_at = {});
+                                                   const DescribeAs& describe_as = {});
 
  private:
   struct Place {
@@ -80,26 +81,41 @@ class PlaceRecognizer {
     bool was_expected = false;
     Loop loop;
   };
-  /// A place to look at, and the frame's descriptors at the scale at which it may look alike.
+  /// A place to look at, and the frame's descriptors in the way in which it may look alike.
   struct Look {
     int place = 0;
     std::span<const Descriptor> seen;
     std::optional<Similarity3> expected;  ///< the frame from the place, where that is known
   };
-  [[nodiscard]] std::vector<Look> look_alikes(ScaledDescriptors& scales,
-                                              bool at_all,
-                                              int before) const;
-  [[nodiscard]] std::vector<Look> expected_looks(const KeptMap& map,
-                                                 std::span<const int> components,
-                                                 int number,
-                                                 const KeptKeyframe& keyframe,
-                                                 ScaledDescriptors& scales) const;
+  /// What recognize() is asked.
+  struct Question {
+    const KeptMap& map;
+    std::span<const int> components;
+    int number;
+    const KeptKeyframe& keyframe;
+
+    /// In a map that nothing connects with the keyframe's.
+    [[nodiscard]] bool is_elsewhere(int place) const {
+      return components[static_cast<std::size_t>(place)] !=
+             components[static_cast<std::size_t>(number)];
+    }
+  };
+  enum class Seen { kNothing, kSomething, kEnough };
+  /// Looks at each place once, and at the neighbours of those in which something is seen, until it
+  /// is enough.
+  template <typename LookAt>
+  void look_through(std::vector<Look> looks, const LookAt& look_at) const;
+  [[nodiscard]] std::vector<Look> look_alikes(LookDescriptors& described,
+                                              bool in_all_ways,
+                                              const std::function<bool(int)>& may_be) const;
+  [[nodiscard]] std::vector<Look> expected_looks(const Question& question,
+                                                 LookDescriptors& described);
   void begin_lookup(const KeptKeyframe& keyframe);
   [[nodiscard]] const Place& place_of(int keyframe) const;
-  [[nodiscard]] std::optional<Sighting> look_at(const KeptMap& map,
-                                                const Look& look,
-                                                int number,
-                                                const KeptKeyframe& keyframe) const;
+  [[nodiscard]] bool is_far(const Question& question, int place) const;
+  [[nodiscard]] std::optional<Sighting> look_at(const Question& question, const Look& look) const;
+  [[nodiscard]] bool say_the_same(const KeptMap& map, const Sighting& a, const Sighting& b) const;
+  void share_what_joins(const Question& question, Sighting& sighting);
   [[nodiscard]] bool is_confirmed(const KeptMap& map, const Sighting& sighting, bool joins) const;
   [[nodiscard]] bool has_come_back(const KeptMap& map, const Place& place, int number) const;
   /// Keyframes below this number are far enough before the present one.
@@ -119,6 +135,7 @@ class PlaceRecognizer {
   int num_lookups_ = 0;
   bool shows_kept_place_ = false;
   bool may_be_locating_ = false;
+  bool is_joining_ = false;  ///< a sighting of another map waits for others that say the same
   /// Where frames were located last, unconfirmed: map_from_camera.
   std::vector<Similarity3> located_;
 };

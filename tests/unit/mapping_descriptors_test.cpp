@@ -120,10 +120,11 @@ TEST(PlaceIndex, FindsThePlaceAmongMany) {
       query.push_back(k % 2 == 0 ? points.changed(places[i][k], 0.12) : points.draw());
     }
     const int number = 10 * static_cast<int>(i);
-    const auto found = index.candidates(query, 3000, 3);
+    const auto found = index.candidates(query, [](int) { return true; }, 3);
     ASSERT_FALSE(found.empty()) << number;
     EXPECT_EQ(found.front().keyframe, number);
-    for (const PlaceCandidate& candidate : index.candidates(query, number, 3)) {
+    for (const PlaceCandidate& candidate :
+         index.candidates(query, [&](int place) { return place < number; }, 3)) {
       EXPECT_LT(candidate.keyframe, number);
     }
   }
@@ -131,7 +132,7 @@ TEST(PlaceIndex, FindsThePlaceAmongMany) {
   for (int k = 0; k < 150; ++k) {
     elsewhere.push_back(points.draw());
   }
-  EXPECT_TRUE(index.candidates(elsewhere, 3000, 3).empty());
+  EXPECT_TRUE(index.candidates(elsewhere, [](int) { return true; }, 3).empty());
 }
 
 }  // namespace
