@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -30,10 +31,11 @@ struct ChannelArguments {
 Expected<int> draw(ChannelArguments& arguments) {
   STEMVO_TRY_GET(arguments.request.config, read_config(arguments.config));
   Progress progress("frames", /*is_quiet=*/false);
-  STEMVO_TRY_GET(const std::size_t written,
+  STEMVO_TRY_GET(const ChannelImagesReport report,
                  write_channel_images(arguments.request, std::ref(progress)));
-  print(fmt::format("{} images in {}\n", written, arguments.request.out_dir.string()));
-  print_json({{"images", written},
+  std::ranges::for_each(report.warnings, print_warning);
+  print(fmt::format("{} images in {}\n", report.num_written, arguments.request.out_dir.string()));
+  print_json({{"images", report.num_written},
               {"out_dir", arguments.request.out_dir.string()},
               {"interrupted", is_interrupted()}});
   return is_interrupted() ? kExitInterrupted : kExitDone;

@@ -146,6 +146,8 @@ Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request
   CalibrationReport report;
   report.is_kitti = sequence.is_kitti;
   Expected<KeptMap> map = drive(request, sequence, progress, report);
+  const auto remarks = sequence.remarks();
+  report.warnings.insert(report.warnings.begin(), remarks.begin(), remarks.end());
   if (!map || report.interrupted) {
     return map ? Expected<CalibrationReport>(report) : map.error();
   }

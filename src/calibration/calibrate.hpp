@@ -42,7 +42,7 @@ struct CalibrationReport {
   std::size_t num_landmarks = 0;
   double median_error_px = 0.0;       ///< of their reprojections
   bool is_kitti = false;              ///< the form of the file
-  std::vector<std::string> warnings;  ///< unreadable frames and the like, one line each
+  std::vector<std::string> warnings;  ///< of the recording, unreadable frames, ..
   bool interrupted = false;           ///< no file is written
   bool written = false;               ///< false also where nothing is determined
 };

@@ -81,6 +81,10 @@ void warn_of_camera(FrameSource& frames);
                                                 const CameraFile& camera,
                                                 const FrameSourceRequest& request);
 
+/// A line where frames are turned as the container asks; else none.
+[[nodiscard]] std::vector<std::string> warn_of_turn(const VideoStream& stream,
+                                                    const std::string& owner);
+
 /// Error, naming the camera file: that of FrameView::create.
 [[nodiscard]] Expected<FrameView> view_of(const Camera& camera,
                                           const std::filesystem::path& camera_file);

@@ -136,6 +136,23 @@ Expected<std::optional<GroundTruth>> FrameSource::ground_truth_of(std::size_t nu
   return std::optional(std::move(truth));
 }
 
+std::vector<std::string> FrameSource::warnings_so_far() const {
+  std::vector<std::string> all = warnings;
+  if (const std::size_t count = stream ? stream->num_counted() : 0; count > 0) {
+    all.push_back(
+        fmt::format("{}: the video does not say when {} frames were taken: counted at {:g} Hz "
+                    "(the camera file's rate_hz, else --rate, else the video's)",
+                    name, count, stream->counted_hz));
+  }
+  return all;
+}
+
+std::vector<std::string> FrameSource::remarks() const {
+  std::vector<std::string> all = warnings_so_far();
+  all.insert(all.begin(), notes.begin(), notes.end());
+  return all;
+}
+
 std::optional<int> dataset::camera_number(const fs::path& path) {
   constexpr std::string_view kPrefix = "camera:";
   constexpr std::size_t kMaxNumber = 1000;

@@ -86,6 +86,10 @@ struct FrameSource {
   [[nodiscard]] double time_s(std::size_t index) const {
     return stream ? stream->time_s(index) : timestamps_s[index];
   }
+  /// The warnings; of a stream that was read also that times were counted.
+  [[nodiscard]] std::vector<std::string> warnings_so_far() const;
+  /// Notes and warnings, for a program that says all in one place.
+  [[nodiscard]] std::vector<std::string> remarks() const;
   /// True poses of the first `num_frames`, where they have one; nullopt: there is no ground truth.
   /// Error, of a stream only: no times match.
   [[nodiscard]] Expected<std::optional<GroundTruth>> ground_truth_of(std::size_t num_frames) const;

@@ -89,7 +89,7 @@ std::optional<Expected<Listing>> find_listing(const fs::path& folder) {
   if (is_there(folder / "rgb.txt")) {
     return list_tum(folder);
   }
-  // A rendered walk is KITTI's layout with a camera.yaml for those who read its images alone.
+  // A folder in KITTI's layout stays one beside a camera.yaml for its images alone.
   const bool is_ours = is_there(folder / "camera.yaml") && !is_there(folder / "calib.txt");
   return is_ours ? std::optional(list_own(folder)) : std::nullopt;
 }

@@ -51,6 +51,16 @@ std::string stem_of(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::vector<std::string> warn_of_turn(const VideoStream& stream, const std::string& owner) {
+  if (stream.turned_deg() == 0.0) {
+    return {};
+  }
+  return {
+      fmt::format("{}: frames are turned by {} degrees, as the container asks and players do; "
+                  "the camera file is one of such frames",
+                  owner, stream.turned_deg())};
+}
+
 Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                   const CameraFile& camera,
                                   const FrameSourceRequest& request) {
@@ -83,12 +93,8 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   frames.given_calibration = request.camera_file;
   frames.camera_height_m = camera.camera_height_m;
   frames.warnings = camera.warnings;
-  if (const double turned_deg = stream->turned_deg(); turned_deg != 0.0) {
-    frames.warnings.push_back(fmt::format(
-        "{}: frames are turned by {} degrees, as the container asks and players do; the "
-        "camera file is taken for one of such frames",
-        owner, turned_deg));
-  }
+  const auto turns = warn_of_turn(*stream, owner);
+  frames.warnings.insert(frames.warnings.end(), turns.begin(), turns.end());
   frames.camera_from_imu = camera.camera_from_imu();
   if (request.ground_truth) {
     STEMVO_TRY_GET(const auto truth, read_truth(*request.ground_truth, request.camera_file));

@@ -13,8 +13,8 @@
 #include "try.hpp"
 
 namespace stemvo {
-Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
-                                           const RunProgress& progress) {
+Expected<ChannelImagesReport> write_channel_images(const ChannelImagesRequest& request,
+                                                   const RunProgress& progress) {
   STEMVO_TRY(validate(request.config));
   FrameSourceRequest source = request;
   source.camera = request.config.input.camera;
@@ -54,7 +54,7 @@ Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
     STEMVO_TRY(save(draw_channel_sheet(frame, images, captions), number, "sheet"));
     goes_on = !progress || progress(i + 1, sequence.size());
   }
-  return num_written;
+  return ChannelImagesReport{num_written, sequence.remarks()};
 }
 
 }  // namespace stemvo

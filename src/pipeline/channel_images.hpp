@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "config/config.hpp"
 #include "dataset/frame_source.hpp"
@@ -19,11 +21,16 @@ struct ChannelImagesRequest : FrameSourceRequest {
   std::optional<FrameRangeRequest> filters;  ///< half open, as frames; else all of the layer
 };
 
+struct ChannelImagesReport {
+  std::size_t num_written = 0;
+  std::vector<std::string> warnings;  ///< of the recording
+};
+
 /// The paper's Figure 1. For each frame: %06d_input.png, %06d_filter_%03d.png (8 bit, as the front
-/// end sees it) and %06d_sheet.png with all of them. Returns the number of images written.
+/// end sees it) and %06d_sheet.png with all of them.
 /// Errors: those of the sequence and the model, filters outside the layer, an unreadable frame,
 /// out_dir that cannot be written.
-[[nodiscard]] Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
-                                                         const RunProgress& progress = {});
+[[nodiscard]] Expected<ChannelImagesReport> write_channel_images(
+    const ChannelImagesRequest& request, const RunProgress& progress = {});
 
 }  // namespace stemvo

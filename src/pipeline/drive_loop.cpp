@@ -185,12 +185,7 @@ class DriveLoop {
     if (stream.is_live) {
       drive_.interrupted = false;
     }
-    if (const std::size_t count = stream.num_counted(); count > 0) {
-      drive_.warnings.push_back(
-          fmt::format("{}: the video does not say when {} frames were taken: counted at {:g} Hz "
-                      "(the camera file's rate_hz, else --rate, else the video's)",
-                      run_.sequence.name, count, stream.counted_hz));
-    } else if (run_.request.rate_hz) {
+    if (stream.num_counted() == 0 && run_.request.rate_hz) {
       drive_.warnings.push_back(
           fmt::format("{}: --rate {:g} is not used: the stream says when its frames were taken",
                       run_.sequence.name, *run_.request.rate_hz));

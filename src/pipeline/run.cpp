@@ -111,7 +111,7 @@ Expected<RunSummary> finish_run(const Run& run, const RunProgress& progress) {
     return fail(fmt::format("{}: expected at least one frame that can be decoded, found none",
                             request.sequence_dir.string()));
   }
-  const auto& odd = run.sequence.warnings;
+  const auto odd = run.sequence.warnings_so_far();
   done.warnings.insert(done.warnings.begin(), odd.begin(), odd.end());
   MetricsReport report;
   Status written = pipeline::write_results(run, done, report);

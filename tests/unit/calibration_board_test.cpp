@@ -129,6 +129,19 @@ TEST_F(BoardCalibration, APictureIsNotOverwritten) {
   }
 }
 
+TEST_F(BoardCalibration, DoubtsAboutThePicturesAreSaid) {
+  const Print print = print_chessboard({9, 6}, 0.025);
+  EXPECT_THAT(calibrate("9x6:0.025", print, 4).warnings, Not(Contains(HasSubstr("16 bits"))));
+  for (const auto& entry : fs::directory_iterator(temp_ / "photos")) {
+    cv::Mat deep;
+    cv::imread(entry.path().string(), cv::IMREAD_GRAYSCALE).convertTo(deep, CV_16U, 16.0);
+    cv::imwrite(entry.path().string(), deep);
+  }
+  const auto report = calibrate_board(
+      {temp_ / "photos", temp_ / "camera.yaml", parse_board("9x6:0.025").value(), "9x6:0.025"});
+  EXPECT_THAT(report->warnings, Contains(HasSubstr("images of 16 bits: values from")));
+}
+
 TEST_F(BoardCalibration, ViewsThatErrAreLeftOutAndSaid) {
   const BoardReport report = calibrate("9x6:0.025", print_chessboard({9, 6}, 0.025), 14, 0.6, 2);
   ASSERT_GE(report.views.size(), 13U);

@@ -80,8 +80,10 @@ TEST_F(CalibrateSequence, ARecordingGetsACameraFile) {
                                  "distortion_model: none\nrate_hz: 10\n",
                                  truth.width_px, truth.height_px, 1.05 * truth.fx_px,
                                  1.05 * truth.fy_px, truth.cx_px, truth.cy_px));
+  request_.rate_hz = 25.0;
   const auto report = calibrate_sequence(request_);
   ASSERT_TRUE(report->written);
+  EXPECT_THAT(report->warnings, Contains(HasSubstr("rate_hz goes before it")));
   const auto file = dataset::read_camera_file(request_.out_file);
   EXPECT_NEAR(file->camera.fx_px / truth.fx_px, 1.0, 0.02);
   EXPECT_NEAR(file->camera.fx_px, report->refined.fx_px, 1e-3);

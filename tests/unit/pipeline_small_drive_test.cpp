@@ -78,12 +78,20 @@ TEST_F(ChannelImages, OfTheInputLayer) {
   request.config.stem.model = "input_layer";
   request.frames = FrameRangeRequest{2, 4};
   const auto written = write_channel_images(request);
-  EXPECT_EQ(*written, 2U * (1 + 3 + 1));
+  EXPECT_EQ(written->num_written, 2U * (1 + 3 + 1));
+  EXPECT_THAT(written->warnings, IsEmpty());
   EXPECT_TRUE(fs::exists(request.out_dir / "000003_filter_002.png"));
   EXPECT_TRUE(fs::exists(request.out_dir / "000002_sheet.png"));
   request.filters = FrameRangeRequest{2, 4};
   EXPECT_THAT(message_of(write_channel_images(request)),
               ::testing::HasSubstr("expected filters inside 0:3, found --filters 2:4"));
+  request.filters = FrameRangeRequest{0, 1};
+  request.sequence_dir = sequence_ / "image_2";
+  request.camera_file = folder_.file("camera.yaml",
+                                     "resolution: [310, 94]\nintrinsics: [180, 180, 154, 46]\n"
+                                     "distortion_model: none\n");
+  EXPECT_THAT(write_channel_images(request)->warnings,
+              Contains(HasSubstr("30 frames per second are taken for granted")));
 }
 
 }  // namespace
