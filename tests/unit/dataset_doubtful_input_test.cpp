@@ -300,7 +300,9 @@ TEST_F(DoubtfulVideo, FramesWithoutTimesAreCounted) {
       EXPECT_TRUE(source.read(i));
       times_s.push_back(source.time_s(i));
     }
-    times_s.push_back(static_cast<double>(source.stream->num_counted()));
+    const std::size_t num_counted = source.stream->num_counted();
+    EXPECT_EQ(source.remarks().size(), num_counted > 0 ? 1U : 0U) << "calibrate and channel say it";
+    times_s.push_back(static_cast<double>(num_counted));
     return times_s;
   };
   const double none = -7.7e15;  // FFmpeg's least number in ms
