@@ -233,7 +233,7 @@ std::string format_junit(const std::vector<ThresholdResult>& results, const std:
   std::size_t failures = 0;
   for (const ThresholdResult& result : results) {
     const bool has_problem = !result.problem.empty();
-    const std::string bound = has_problem ? "" : " " + bound_of(result);
+    const std::string bound = has_problem ? "" : fmt::format(" {}", bound_of(result));
     cases +=
         fmt::format("  <testcase classname=\"{}\" name=\"{}\"", xml(name), xml(result.key + bound));
     (has_problem ? errors : failures) += result.passed ? 0 : 1;
