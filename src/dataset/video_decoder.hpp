@@ -35,6 +35,8 @@ class VideoDecoder {
   [[nodiscard]] virtual double position_ms() const = 0;
   /// How the container asked for the frames to be turned, and they were.
   [[nodiscard]] virtual double turned_deg() const = 0;
+  /// Of gray levels in the file; the upper 8 are decoded.
+  [[nodiscard]] virtual unsigned gray_bits() const { return 8; }
 };
 
 /// A file or an address by FFmpeg, turned as the container asks unless frames that are not have

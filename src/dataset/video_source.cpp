@@ -95,6 +95,11 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   frames.warnings = camera.warnings;
   const auto turns = warn_of_turn(*stream, owner);
   frames.warnings.insert(frames.warnings.end(), turns.begin(), turns.end());
+  if (stream->gray_bits() > 8) {
+    frames.warnings.push_back(fmt::format(
+        "{}: of {} bits per gray level the upper 8 are taken; images of 16 bits are read whole",
+        owner, stream->gray_bits()));
+  }
   frames.camera_from_imu = camera.camera_from_imu();
   if (request.ground_truth) {
     STEMVO_TRY_GET(const auto truth, read_truth(*request.ground_truth, request.camera_file));

@@ -41,6 +41,7 @@ class VideoStream {
   [[nodiscard]] cv::Size size() const { return decoder_->size(); }
   [[nodiscard]] bool is_live() const { return is_live_; }
   [[nodiscard]] double turned_deg() const { return decoder_->turned_deg(); }
+  [[nodiscard]] unsigned gray_bits() const { return decoder_->gray_bits(); }
   /// As the container says, which may be wrong; 0: it does not say.
   [[nodiscard]] std::size_t expected_frames() const;
   [[nodiscard]] double rate_hz() const;

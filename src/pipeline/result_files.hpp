@@ -28,7 +28,8 @@ inline constexpr std::array kResultNames = {"config.yaml",
                                             "trajectory_map_kitti.txt",
                                             "trajectory_map_tum.txt",
                                             "trajectory.png",
-                                            "map.ply"};
+                                            "map.ply",
+                                            ".stemvo_video"};  // names the video in the folder
 
 /// A run refers to its request, its frames and its odometry.
 struct Run {

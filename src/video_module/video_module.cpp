@@ -42,6 +42,11 @@ class OpenCvDecoder final : public VideoDecoder {
   double rate_hz() const override { return capture_.get(cv::CAP_PROP_FPS); }
   double position_ms() const override { return capture_.get(cv::CAP_PROP_POS_MSEC); }
   double turned_deg() const override { return turned_deg_; }
+  unsigned gray_bits() const override {
+    const auto tag = static_cast<unsigned>(capture_.get(cv::CAP_PROP_CODEC_PIXEL_FORMAT));
+    // FFmpeg's: "Y1", 0, bits; reversed where the high byte comes first.
+    return (tag & 0xffffffU) == 0x003159U ? tag >> 24U : tag >> 8U == 0x593100U ? tag & 0xffU : 8U;
+  }
 
  private:
   cv::VideoCapture capture_;
