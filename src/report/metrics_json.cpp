@@ -9,8 +9,11 @@
 #include "try.hpp"
 
 namespace stemvo {
+namespace {
 
 using Json = nlohmann::ordered_json;
+
+}  // namespace
 
 // Found by nlohmann's library.
 void to_json(Json& json, const CameraReport& report) {

@@ -188,10 +188,11 @@ double usual_step(const std::vector<TimedRow>& rows) {
   return steps.empty() ? 0.0 : *middle;
 }
 
-/// Times from `first` to `last` and those of the span lie over each other and are of one length,
-/// by less than half the way to the next unit.
+/// Lengths of time in one unit differ by less: half the way to the next unit.
+constexpr double kMaxRatio = 30.0;
+
+/// Times from `first` to `last` and those of the span lie over each other and are of one length.
 bool is_of_span(double first, double last, const std::pair<double, double>& span_s) {
-  constexpr double kMaxRatio = 30.0;
   const double length = last - first;
   const double expected = span_s.second - span_s.first;
   return first <= span_s.second && last >= span_s.first && length <= kMaxRatio * expected &&
@@ -204,6 +205,11 @@ Expected<Unit> find_unit(const std::vector<TimedRow>& rows, const UsualTimes& us
   const double first = rows.front().time_s;
   const double last = rows.back().time_s;
   const auto is_short = [&](const Unit& unit) { return step * unit.size_s <= usual.max_step_s; };
+  // Where rows would lie in a moment of the drive, they are of a larger unit, and miss it.
+  const auto covers_frames = [&](const Unit& unit) {
+    return !usual.span_s ||
+           usual.span_s->second - usual.span_s->first <= kMaxRatio * (last - first) * unit.size_s;
+  };
   for (const Unit& unit : kUnits) {
     if (is_short(unit) && first * unit.size_s >= 1e9 && last * unit.size_s <= 4e9) {
       return unit;  // since 1970
@@ -220,7 +226,7 @@ Expected<Unit> find_unit(const std::vector<TimedRow>& rows, const UsualTimes& us
         is_of_span(first * unit.size_s, last * unit.size_s, *usual.span_s)) {
       of_span = unit;
     }
-    if (is_long && is_short(unit)) {
+    if (is_long && is_short(unit) && covers_frames(unit)) {
       usual_units.push_back(unit);
     }
   }
@@ -228,7 +234,10 @@ Expected<Unit> find_unit(const std::vector<TimedRow>& rows, const UsualTimes& us
     return fail(fmt::format("expected times in seconds, found steps of {}, {} or {}", step,
                             usual_units[0].name, usual_units[1].name));
   }
-  return of_span.value_or(usual_units.empty() ? std::end(kUnits)[-1] : usual_units[0]);
+  if (usual_units.empty()) {
+    usual_units.push_back(usual.span_s ? kUnits[0] : std::end(kUnits)[-1]);
+  }
+  return of_span.value_or(usual_units[0]);
 }
 
 }  // namespace
