@@ -148,10 +148,8 @@ class Reader {
     const bool is_chain = format_.body == kKalibr.body;
     if (is_chain && root["cam1"]) {
       const YAML::Node topic = root["cam0"]["rostopic"];
-      warnings_.push_back(fmt::format(
-          "{}: cam0{} is taken of several cameras; for images of another give a file of that one",
-          file_.string(),
-          topic && topic.IsScalar() ? fmt::format(" ({})", one_line(topic.Scalar())) : ""));
+      warnings_.push_back(fmt::format("{}: of several cameras cam0{} is taken", file_.string(),
+                                      topic ? " (" + one_line(topic.Scalar()) + ")" : ""));
     }
     return collect_keys(is_chain ? root["cam0"] : root);
   }

@@ -7,8 +7,6 @@
 #include <functional>
 #include <iterator>
 #include <limits>
-#include <ranges>
-#include <set>
 
 #include "geometry/median.hpp"
 #include "mapping/expected_views.hpp"
@@ -35,17 +33,6 @@ constexpr int kMinLookupsApart = 6;
 constexpr std::size_t kMaxTracks = 4;
 constexpr double kMaxNetWay = 0.4;
 constexpr int kMaxCandidates = 3;
-/// Checks of the last lookups may confirm each other.
-constexpr int kMaxLookupsApart = 3;
-/// A join of two maps takes this share of the corners, and so many sightings that say the same:
-/// streets that share a house look alike too, but not all of it.
-constexpr double kMinJoinShare = 0.25;
-constexpr std::ptrdiff_t kMinJoinSightings = 3;
-/// Two checks that say the same differ by less: log scale, rad, share of the depth and of the way
-/// between them.
-constexpr double kMaxLogScale = 0.1;
-constexpr double kMaxTurn_rad = 0.05;
-constexpr double kMaxShift = 0.1;
 /// Bounds of the motion between a frame and one just before, both without a pose: rad, share of the
 /// depth.
 constexpr double kMaxMotion_rad = 0.3;
@@ -142,9 +129,7 @@ void PlaceRecognizer::begin_lookup(const KeptKeyframe& keyframe) {
   shows_kept_place_ =
       !kept_tracks_.empty() &&
       !is_share_below(kMaxSharedPlace, num_shared(kept_tracks_, last_tracks_), kept_tracks_.size());
-  std::erase_if(sightings_, [&](const Sighting& sighting) {
-    return sighting.lookup + kMaxLookupsApart < num_lookups_;
-  });
+  sightings_.begin_lookup(num_lookups_, depth_);
 }
 
 std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
@@ -170,10 +155,10 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
     const bool joins =
         question.is_elsewhere(look.place) && map.keyframes[slot(look.place)].frame >= 0;
     if (joins) {
-      share_what_joins(question, *sighting);
+      sightings_.share_what_joins(map, keyframe.corners.size(), *sighting);
     }
-    const bool is_found = is_confirmed(map, *sighting, joins);
-    is_joining_ = is_joining_ || (joins && !is_found && sighting->share >= kMinJoinShare);
+    const bool is_found = sightings_.confirm(map, *sighting, joins);
+    is_joining_ = is_joining_ || (joins && !is_found && sighting->may_join());
     if (is_found) {
       found = sighting->loop;
       if (sighting->share >= kSamePlace) {
@@ -181,7 +166,7 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
         kept_tracks_ = last_tracks_;
       }
     }
-    sightings_.push_back(std::move(*sighting));
+    sightings_.add(std::move(*sighting));
     return is_found ? Seen::kEnough : Seen::kSomething;
   });
   return found;
@@ -265,8 +250,7 @@ bool PlaceRecognizer::is_far(const Question& question, int place) const {
   return place < end_of_far() || question.is_elsewhere(place);
 }
 
-std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(const Question& question,
-                                                                  const Look& look) const {
+std::optional<Sighting> PlaceRecognizer::look_at(const Question& question, const Look& look) const {
   const auto& [map, components, number, keyframe] = question;
   const KeptKeyframe& old = keyframe_of(map, look.place);
   if (!is_far(question, look.place) || (num_shared(track_ids_of(old), last_tracks_) > kMaxTracks &&
@@ -288,51 +272,6 @@ std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(const Question
 bool PlaceRecognizer::has_come_back(const KeptMap& map, const Place& place, int number) const {
   const Similarity3 net = pose_of(map, place.keyframe).inverse() * pose_of(map, number);
   return place.depth > 0.0 && change_of_view(net, place.depth) < kMaxNetWay * (path_ - place.path);
-}
-
-bool PlaceRecognizer::say_the_same(const KeptMap& map, const Sighting& a, const Sighting& b) const {
-  const Similarity3 a_from_b = pose_of(map, a.loop.to).inverse() * pose_of(map, b.loop.to);
-  // The identity, if both are right.
-  const Similarity3 difference = (pose_of(map, a.loop.from) * a.loop.from_to * a_from_b).inverse() *
-                                 pose_of(map, b.loop.from) * b.loop.from_to;
-  return std::abs(std::log(difference.scale)) < kMaxLogScale &&
-         turn_of(difference) < kMaxTurn_rad &&
-         difference.translation.norm() < kMaxShift * (depth_ + a_from_b.translation.norm());
-}
-
-/// How much of the keyframe the places of another map explain together that say the same.
-void PlaceRecognizer::share_what_joins(const Question& question, Sighting& sighting) {
-  std::set<int> explained;
-  std::vector<Sighting*> same = {&sighting};
-  for (Sighting& other : sightings_) {
-    if (other.lookup == sighting.lookup && say_the_same(question.map, other, sighting)) {
-      same.push_back(&other);
-    }
-  }
-  for (const Sighting* one : same) {
-    std::ranges::copy(one->loop.corners | std::views::values,
-                      std::inserter(explained, explained.end()));
-  }
-  for (Sighting* one : same) {
-    one->share = static_cast<double>(explained.size()) /
-                 static_cast<double>(question.keyframe.corners.size());
-  }
-}
-
-/// By another sighting, of another place; of keyframes that were looked up before, too, where two
-/// maps are to be joined.
-bool PlaceRecognizer::is_confirmed(const KeptMap& map, const Sighting& sighting, bool joins) const {
-  if (joins && sighting.share < kMinJoinShare) {
-    return false;
-  }
-  const auto num = std::ranges::count_if(sightings_, [&](const Sighting& other) {
-    const bool is_same_view = other.loop.from == sighting.loop.from &&
-                              (!sighting.was_expected || other.lookup == sighting.lookup);
-    return !is_same_view &&
-           !(joins && (other.lookup == sighting.lookup || other.share < kMinJoinShare)) &&
-           say_the_same(map, other, sighting);
-  });
-  return num >= (joins ? kMinJoinSightings - 1 : 1);
 }
 
 const PlaceRecognizer::Place& PlaceRecognizer::place_of(int keyframe) const {
@@ -358,16 +297,11 @@ void PlaceRecognizer::add(int number, const KeptKeyframe& keyframe) {
 }
 
 void PlaceRecognizer::renumber(std::span<const int> numbers) {
-  const auto number_of = [&](int keyframe) { return numbers[slot(keyframe)]; };
   index_.renumber(numbers);
   for (Place& place : places_) {
-    place.keyframe = number_of(place.keyframe);
+    place.keyframe = numbers[slot(place.keyframe)];
   }
-  for (Sighting& sighting : sightings_) {
-    sighting.loop.from = number_of(sighting.loop.from);
-    sighting.loop.to = number_of(sighting.loop.to);
-  }
-  std::erase_if(sightings_, [](const Sighting& sighting) { return sighting.loop.to < 0; });
+  sightings_.renumber(numbers);
 }
 
 std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
@@ -393,8 +327,9 @@ std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
                difference.translation.norm() < max_shift * median_depth(old.corners);
       };
     };
-    const bool is_certain = std::ranges::any_of(located_, is_near(kMaxTurn_rad, kMaxShift)) ||
-                            std::ranges::any_of(before, is_near(kMaxMotion_rad, kMaxMotion));
+    const bool is_certain =
+        std::ranges::any_of(located_, is_near(kMaxSameTurn_rad, kMaxSameShift)) ||
+        std::ranges::any_of(before, is_near(kMaxMotion_rad, kMaxMotion));
     located_.push_back(map_from_camera);
     if (!is_certain) {
       return Seen::kSomething;

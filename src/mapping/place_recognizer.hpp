@@ -13,6 +13,7 @@
 #include "mapping/kept_map.hpp"
 #include "mapping/place_check.hpp"
 #include "mapping/place_index.hpp"
+#include "mapping/sightings.hpp"
 #include "stemvo/rigid3.hpp"
 
 namespace stemvo {
@@ -74,13 +75,6 @@ class PlaceRecognizer {
     double path = 0.0;   ///< path_ then
     double depth = 0.0;  ///< median; 0: it has no landmarks
   };
-  /// A check that went well.
-  struct Sighting {
-    int lookup = 0;      ///< its number
-    double share = 0.0;  ///< of the keyframe's corners that agree
-    bool was_expected = false;
-    Loop loop;
-  };
   /// A place to look at, and the frame's descriptors in the way in which it may look alike.
   struct Look {
     int place = 0;
@@ -114,9 +108,6 @@ class PlaceRecognizer {
   [[nodiscard]] const Place& place_of(int keyframe) const;
   [[nodiscard]] bool is_far(const Question& question, int place) const;
   [[nodiscard]] std::optional<Sighting> look_at(const Question& question, const Look& look) const;
-  [[nodiscard]] bool say_the_same(const KeptMap& map, const Sighting& a, const Sighting& b) const;
-  void share_what_joins(const Question& question, Sighting& sighting);
-  [[nodiscard]] bool is_confirmed(const KeptMap& map, const Sighting& sighting, bool joins) const;
   [[nodiscard]] bool has_come_back(const KeptMap& map, const Place& place, int number) const;
   /// Keyframes below this number are far enough before the present one.
   [[nodiscard]] int end_of_far() const;
@@ -125,13 +116,13 @@ class PlaceRecognizer {
 
   PlaceIndex index_;
   std::vector<Place> places_;
-  std::vector<int> last_tracks_;     ///< of the keyframe looked up last
-  std::vector<int> kept_tracks_;     ///< of the last one that became a place, or showed one
-  int last_frame_ = 0;               ///< looked up
-  Rigid3 last_pose_;                 ///< world_from_camera
-  double depth_ = 0.0;               ///< median, where it is known
-  double path_ = 0.0;                ///< how far the view has moved: rad, depths
-  std::vector<Sighting> sightings_;  ///< of the last lookups
+  std::vector<int> last_tracks_;  ///< of the keyframe looked up last
+  std::vector<int> kept_tracks_;  ///< of the last one that became a place, or showed one
+  int last_frame_ = 0;            ///< looked up
+  Rigid3 last_pose_;              ///< world_from_camera
+  double depth_ = 0.0;            ///< median, where it is known
+  double path_ = 0.0;             ///< how far the view has moved: rad, depths
+  Sightings sightings_;           ///< of the last lookups
   int num_lookups_ = 0;
   bool shows_kept_place_ = false;
   bool may_be_locating_ = false;

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+#include "mapping/sightings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <ranges>
+#include <set>
+
+namespace stemvo {
+namespace {
+
+constexpr int kMaxLookupsApart = 3;
+/// So many sightings say that two maps are one.
+constexpr std::ptrdiff_t kMinJoinSightings = 3;
+constexpr double kMaxLogScale = 0.1;
+
+}  // namespace
+
+void Sightings::begin_lookup(int number, double depth) {
+  depth_ = depth;
+  std::erase_if(sightings_, [&](const Sighting& sighting) {
+    return sighting.lookup + kMaxLookupsApart < number;
+  });
+}
+
+bool Sightings::say_the_same(const KeptMap& map, const Sighting& a, const Sighting& b) const {
+  const auto pose_of = [&](int keyframe) { return map.map_from_keyframe[slot(keyframe)]; };
+  const Similarity3 a_from_b = pose_of(a.loop.to).inverse() * pose_of(b.loop.to);
+  // The identity, if both are right.
+  const Similarity3 difference = (pose_of(a.loop.from) * a.loop.from_to * a_from_b).inverse() *
+                                 pose_of(b.loop.from) * b.loop.from_to;
+  return std::abs(std::log(difference.scale)) < kMaxLogScale &&
+         Eigen::Quaterniond::Identity().angularDistance(difference.rotation) < kMaxSameTurn_rad &&
+         difference.translation.norm() < kMaxSameShift * (depth_ + a_from_b.translation.norm());
+}
+
+void Sightings::share_what_joins(const KeptMap& map, std::size_t num_corners, Sighting& sighting) {
+  std::set<int> explained;
+  std::vector<Sighting*> same = {&sighting};
+  for (Sighting& other : sightings_) {
+    if (other.lookup == sighting.lookup && say_the_same(map, other, sighting)) {
+      same.push_back(&other);
+    }
+  }
+  for (const Sighting* one : same) {
+    std::ranges::copy(one->loop.corners | std::views::values,
+                      std::inserter(explained, explained.end()));
+  }
+  for (Sighting* one : same) {
+    one->share = static_cast<double>(explained.size()) / static_cast<double>(num_corners);
+  }
+}
+
+bool Sightings::confirm(const KeptMap& map, const Sighting& sighting, bool joins) const {
+  if (joins && !sighting.may_join()) {
+    return false;
+  }
+  const auto num = std::ranges::count_if(sightings_, [&](const Sighting& other) {
+    const bool is_same_view = other.loop.from == sighting.loop.from &&
+                              (!sighting.was_expected || other.lookup == sighting.lookup);
+    return !is_same_view && !(joins && (other.lookup == sighting.lookup || !other.may_join())) &&
+           say_the_same(map, other, sighting);
+  });
+  return num >= (joins ? kMinJoinSightings - 1 : 1);
+}
+
+void Sightings::renumber(std::span<const int> numbers) {
+  for (Sighting& sighting : sightings_) {
+    sighting.loop.from = numbers[slot(sighting.loop.from)];
+    sighting.loop.to = numbers[slot(sighting.loop.to)];
+  }
+  std::erase_if(sightings_, [](const Sighting& sighting) { return sighting.loop.to < 0; });
+}
+
+}  // namespace stemvo
