@@ -43,7 +43,8 @@ class Actors:
         import ray
 
         self._ray = ray
-        ray.init(address=address, num_cpus=None if address else jobs, include_dashboard=False, logging_level="error", log_to_driver=False)
+        # Without "local" Ray would join any cluster that happens to run on this machine.
+        ray.init(address=address or "local", num_cpus=None if address else jobs, include_dashboard=False, logging_level="error", log_to_driver=False)
         actor = ray.remote(max_restarts=-1, max_task_retries=-1, scheduling_strategy="SPREAD")(_Actor)
         count = jobs or int(ray.cluster_resources()["CPU"])
         self._actors = [actor.remote() for _ in range(count)]

@@ -3,7 +3,9 @@
 
 import os
 import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -19,6 +21,9 @@ def test_a_lost_node_changes_nothing(tmp_path, monkeypatch):
     assert CliRunner().invoke(main, [*command, "--no-ray", "--out", str(tmp_path / "alone")]).exit_code == 0
     cluster = cluster_utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
     try:
+        # Without --address the search keeps to its own processes, whatever cluster runs beside it: in a process of its own, as a user's is.
+        beside = [Path(sys.executable).with_name("stemvo-lab"), *command, "--jobs", "2", "--out", tmp_path / "beside"]
+        subprocess.run(beside, check=True, stdout=subprocess.DEVNULL)
         lost = cluster.add_node(num_cpus=1)
         cluster.wait_for_nodes()
         submit, submitted = work.Actors.submit, []
@@ -36,5 +41,6 @@ def test_a_lost_node_changes_nothing(tmp_path, monkeypatch):
     finally:
         cluster.shutdown()
     names = ("filters.csv", "rows.csv")
-    one, other = ([sorted((tmp_path / folder / name).read_text().splitlines()) for name in names] for folder in ("alone", "cluster"))
-    assert one == other and len(one[1]) == 17
+    folders = ("alone", "beside", "cluster")
+    one, beside, other = ([sorted((tmp_path / folder / name).read_text().splitlines()) for name in names] for folder in folders)
+    assert one == beside == other and len(one[1]) == 17
