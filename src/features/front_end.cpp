@@ -3,8 +3,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "features/descriptor_front_end.hpp"
-#include "features/klt_front_end.hpp"
 #include "features/patch_front_end.hpp"
 
 namespace stemvo {
@@ -32,9 +30,9 @@ std::unique_ptr<FrontEnd> create_front_end(const FeatureOptions& options) {
     return std::make_unique<PatchFrontEnd>(options);
   }
   if (options.method == FeatureMethod::kKlt) {
-    return std::make_unique<KltFrontEnd>(options);
+    return create_klt_front_end(options);
   }
-  return std::make_unique<DescriptorFrontEnd>(options);
+  return create_descriptor_front_end(options);
 }
 
 }  // namespace stemvo

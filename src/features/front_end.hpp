@@ -86,5 +86,8 @@ class FrontEnd {
 };
 
 [[nodiscard]] std::unique_ptr<FrontEnd> create_front_end(const FeatureOptions& options);
+/// One kind, for create_front_end().
+[[nodiscard]] std::unique_ptr<FrontEnd> create_klt_front_end(const FeatureOptions& options);
+[[nodiscard]] std::unique_ptr<FrontEnd> create_descriptor_front_end(const FeatureOptions& options);
 
 }  // namespace stemvo

@@ -17,7 +17,7 @@ namespace stemvo {
 /// cut out anew where the point is; the track keeps its id.
 class PatchFrontEnd final : public PointFrontEnd {
  public:
-  explicit PatchFrontEnd(const FeatureOptions& options) : PointFrontEnd(options) {}
+  using PointFrontEnd::PointFrontEnd;
 
   [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(const ChannelImage& channel,
                                                             const cv::Mat& mask) const override;

@@ -16,6 +16,8 @@ namespace stemvo {
 /// they are tracked is the derived class's.
 class PointFrontEnd : public FrontEnd {
  public:
+  explicit PointFrontEnd(const FeatureOptions& options) : options_(options) {}
+
   using FrontEnd::process;
   [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image,
                                 const ImageClue& clue) override;
@@ -46,8 +48,6 @@ class PointFrontEnd : public FrontEnd {
     /// The turn from here to the newest image.
     std::optional<Eigen::Matrix3d> turn_to_newest = Eigen::Matrix3d::Identity();
   };
-
-  explicit PointFrontEnd(const FeatureOptions& options) : options_(options) {}
 
   [[nodiscard]] const FeatureOptions& options() const { return options_; }
   /// Levels of a pyramid over an image of the given scale (input pixels per pixel): an image of

@@ -9,7 +9,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "geometry/cauchy_loss.hpp"
+#include "geometry/minimize.hpp"
 #include "geometry/normal_equations.hpp"
 #include "internal_check.hpp"
 

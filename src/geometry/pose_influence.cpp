@@ -7,10 +7,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "geometry/cauchy_loss.hpp"
-#include "geometry/reprojection.hpp"
+#include "geometry/minimize.hpp"
+#include "geometry/residuals.hpp"
 #include "internal_check.hpp"
-#include "sampson.hpp"
 
 namespace stemvo {
 namespace {

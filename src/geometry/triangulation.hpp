@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "geometry/decomposition.hpp"
+#include "geometry/two_view_models.hpp"
 #include "stemvo/rigid3.hpp"
 
 namespace stemvo::internal {

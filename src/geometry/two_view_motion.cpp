@@ -9,8 +9,8 @@
 #include <Eigen/Core>
 
 #include "degrees.hpp"
-#include "geometry/decomposition.hpp"
 #include "geometry/triangulation.hpp"
+#include "geometry/two_view_models.hpp"
 
 namespace stemvo {
 namespace {

@@ -15,7 +15,6 @@
 
 #include "geometry/median.hpp"
 #include "internal_check.hpp"
-#include "mapping/adjustment_covariance.hpp"
 #include "mapping/adjustment_errors.hpp"
 #include "mapping/pose_graph.hpp"
 

@@ -8,7 +8,6 @@
 
 #include "geometry/median.hpp"
 #include "mapping/descriptors.hpp"
-#include "mapping/drift_bound.hpp"
 #include "mapping/pose_graph.hpp"
 #include "timing/stage_timer.hpp"
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "geometry/median.hpp"
-#include "geometry/similarity_refinement.hpp"
+#include "geometry/pose_refinement.hpp"
 #include "odometry/robust_models.hpp"
 
 namespace stemvo {

@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "geometry/median.hpp"
-#include "mapping/expected_views.hpp"
+#include "mapping/place_candidates.hpp"
 
 namespace stemvo {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "mapping/descriptors.hpp"
 #include "mapping/kept_map.hpp"
+#include "mapping/place_candidates.hpp"
 #include "mapping/place_check.hpp"
-#include "mapping/place_index.hpp"
 #include "mapping/sightings.hpp"
 #include "stemvo/rigid3.hpp"
 

@@ -4,9 +4,9 @@
 #include <utility>
 
 #include "internal_check.hpp"
+#include "odometry/frame_clock.hpp"
 #include "odometry/pair_estimator.hpp"
 #include "odometry/road/image.hpp"
-#include "odometry/stopwatch.hpp"
 #include "odometry/window_estimator.hpp"
 #include "timing/stage_timer.hpp"
 

@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "geometry/decomposition.hpp"
 #include "geometry/pose_refinement.hpp"
+#include "geometry/two_view_models.hpp"
 #include "geometry/two_view_motion.hpp"
-#include "odometry/motion_rivals.hpp"
+#include "odometry/moving_things.hpp"
 
 namespace stemvo {
 namespace {

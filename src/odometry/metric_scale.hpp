@@ -5,10 +5,13 @@
 #include <string_view>
 #include <vector>
 
+#include "odometry/road/belief.hpp"
 #include "odometry/road/image.hpp"
 #include "odometry/road/scale.hpp"
 #include "odometry/scale_filter.hpp"
-#include "odometry/way_scale.hpp"
+#include "odometry/way.hpp"
+#include "odometry/window.hpp"
+#include "stemvo/camera.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/options.hpp"
 #include "stemvo/rigid3.hpp"
@@ -61,5 +64,12 @@ class MetricScale {
   ScaleState state_ = ScaleState::kDisabled;
   std::string_view reason_;  ///< of the road
 };
+
+/// The window's landmarks that a frame sees, as witnesses of the road: those in front of the camera
+/// that at least three keyframes see, which a wrong track seldom survives.
+[[nodiscard]] std::vector<RoadLandmark> road_landmarks(const Window& window,
+                                                       const Rigid3& world_from_camera,
+                                                       const Observations& seen,
+                                                       const Camera& camera);
 
 }  // namespace stemvo

@@ -2,14 +2,17 @@
 #pragma once
 
 #include <array>
+#include <condition_variable>
 #include <cstddef>
+#include <exception>
 #include <functional>
+#include <limits>
 #include <mutex>
+#include <thread>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
-#include "odometry/frame_loops.hpp"
 #include "odometry/phased_odometry.hpp"
 #include "odometry/way.hpp"
 #include "stemvo/error.hpp"
@@ -17,6 +20,70 @@
 #include "stemvo/odometry.hpp"
 
 namespace stemvo {
+
+/// Frames at work at a time, the one whose result is awaited among them. Frame k + kMaxInFlight is
+/// taken when frame k is optimized: a ring of so many frames is enough.
+inline constexpr std::size_t kMaxInFlight = 6;
+
+/// A frame goes through these, in this order; each is given the frame's number, counted from 0.
+/// Each stage takes the frames in order.
+struct FrameStages {
+  std::function<void(std::size_t)> prepare;
+  std::function<void(std::size_t)> track;     ///< after localize() of the frame before
+  std::function<void(std::size_t)> localize;  ///< after optimize() of the frame before
+  std::function<bool(std::size_t)> optimize;  ///< beside track() of the next; false ends the run
+};
+
+/// Takes frames through three loops, each in a thread: prepare, track and localize, optimize. With
+/// one thread push() takes its frame through all stages. A stage that throws ends the run. Frames
+/// begun are dropped where a run ends before finish(). One call at a time.
+class FrameLoops {
+ public:
+  /// std::system_error: no more threads are to be had.
+  FrameLoops(FrameStages stages, int num_threads);
+  ~FrameLoops();
+  FrameLoops(const FrameLoops&) = delete;
+  FrameLoops& operator=(const FrameLoops&) = delete;
+
+  /// Waits for room and has `fill` put the next frame, whose number it is given, in its place.
+  /// False: the run has ended. A frame whose fill() throws was never there.
+  [[nodiscard]] bool push(const std::function<void(std::size_t)>& fill);
+  /// Waits until all frames pushed are done. False: the run has ended.
+  [[nodiscard]] bool wait_for_all();
+  /// Waits until frame k is done, or there is none to wait for: the run has ended, or does without
+  /// it. This one may be called beside the others.
+  bool wait_for(std::size_t k);
+  /// Waits likewise, ends the run, and throws again what a stage threw.
+  void finish();
+  /// finish() throws.
+  [[nodiscard]] bool has_thrown() const;
+
+ private:
+  void prepare();
+  void track_and_localize();
+  void optimize();
+  void take_through(std::size_t k);
+
+  template <typename Work>
+  void guard(const Work& work);
+  template <typename Condition>
+  [[nodiscard]] bool wait(std::size_t k, const Condition& may_go_on);
+  void advance(std::size_t& count);
+  void stop(const std::exception_ptr& thrown);
+
+  FrameStages stages_;
+  // The loops wait for each other by counting frames; the mutex guards what follows.
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::size_t num_frames_ = std::numeric_limits<std::size_t>::max();  ///< known once all are there
+  std::size_t num_pushed_ = 0;
+  std::size_t num_prepared_ = 0;
+  std::size_t num_localized_ = 0;
+  std::size_t num_optimized_ = 0;
+  bool is_stopped_ = false;
+  std::exception_ptr thrown_;
+  std::vector<std::jthread> threads_;  ///< last, so that they end first
+};
 
 /// A frame as it comes: the pixels, as PhasedOdometry::prepare takes them, are nobody else's; an
 /// Error where they could not be read.

@@ -9,7 +9,7 @@
 #include "internal_check.hpp"
 #include "mapping/map_file.hpp"
 #include "odometry/check_frame.hpp"
-#include "odometry/stopwatch.hpp"
+#include "odometry/frame_clock.hpp"
 #include "odometry/whole_map.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"

@@ -5,10 +5,9 @@
 #include <cmath>
 #include <utility>
 
-#include "geometry/decomposition.hpp"
 #include "geometry/median.hpp"
-#include "geometry/two_view_scores.hpp"
-#include "odometry/cell_votes.hpp"
+#include "geometry/two_view_models.hpp"
+#include "odometry/moving_things.hpp"
 
 namespace stemvo {
 namespace {

@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <utility>
 
-#include "geometry/decomposition.hpp"
+#include <fmt/format.h>
+
 #include "geometry/pose_refinement.hpp"
+#include "geometry/two_view_models.hpp"
 #include "geometry/two_view_motion.hpp"
-#include "geometry/two_view_scores.hpp"
+#include "odometry/check_frame.hpp"
 #include "odometry/robust_models.hpp"
 #include "odometry/tracks.hpp"
+#include "stemvo/two_view.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -30,6 +33,24 @@ constexpr double kNoiseParallax = 5.0;
 
 /// After a cut, points are found by chance here and there; some motion fits a quarter of them.
 constexpr double kMinPairInlierShare = 0.3;
+
+Status check_matches(std::span<const Eigen::Vector2d> prev_uv,
+                     std::span<const Eigen::Vector2d> cur_uv) {
+  if (prev_uv.size() != cur_uv.size()) {
+    return fail(
+        fmt::format("matches: expected as many points in one image as in the other, found "
+                    "{} and {}",
+                    prev_uv.size(), cur_uv.size()));
+  }
+  for (std::size_t i = 0; i < prev_uv.size(); ++i) {
+    if (!prev_uv[i].allFinite() || !cur_uv[i].allFinite()) {
+      return fail(
+          fmt::format("matches: expected finite pixels, found ({}, {}) and ({}, {}) in match {}",
+                      prev_uv[i].x(), prev_uv[i].y(), cur_uv[i].x(), cur_uv[i].y(), i));
+    }
+  }
+  return {};
+}
 
 }  // namespace
 
@@ -148,6 +169,27 @@ void TwoViewEstimator::refine(const PixelPairs& pairs,
     result.covariance =
         relative_pose_covariance(result.cur_from_prev, inliers, camera, options_.refine_loss_px);
   }
+}
+
+Expected<TwoViewResult> estimate_two_view(std::span<const Eigen::Vector2d> prev_uv,
+                                          std::span<const Eigen::Vector2d> cur_uv,
+                                          const Camera& camera,
+                                          const Options& options) {
+  Status status = check_camera(camera);
+  status = status ? validate(options) : status;
+  status = status ? check_matches(prev_uv, cur_uv) : status;
+  if (!status) {
+    return status.error();
+  }
+  MeasuredMotion motion =
+      TwoViewEstimator(options).measure({prev_uv, cur_uv}, camera, /*is_initializing=*/true);
+  return TwoViewResult{motion.state,
+                       motion.cur_from_prev,
+                       motion.model,
+                       motion.homography_ratio,
+                       motion.parallax_px,
+                       motion.is_decisive,
+                       std::move(motion.inlier_mask)};
 }
 
 }  // namespace stemvo

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/way.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -39,6 +42,17 @@ Status check_time(const char* name, double time_s, double last_s) {
                                    : "a finite time";
   return fail(fmt::format("{}: expected {}, found {} s", name, expected, time_s));
 }
+
+/// A station is so many pixels of motion from the one before, and its place known to so many.
+constexpr double kStation_px = 1.0;
+constexpr double kPlace_px = 0.05;
+/// A camera that stands tells nothing, however long: its path begins anew after so long.
+constexpr double kMaxStay_s = 2.0;
+constexpr double kMemory_s = 30.0;
+/// Ways join where one begins as the other ends.
+constexpr double kSameTime_s = 1e-6;
+/// A way that is no longer than so many of its sigmas may be none.
+constexpr double kMinWaySigmas = 3.0;
 
 }  // namespace
 
@@ -94,6 +108,138 @@ std::vector<Way> WayInput::take(double time_s) {
                     held_s * last_speed_->sigma, Way::Kind::kHeld});
   }
   return ways;
+}
+
+void WayScale::restart(double time_s) {
+  stations_ = {{time_s, 0.0}};
+  now_from_station_ = {};
+  for (Queue& queue : queues_) {
+    queue.joined.reset();
+  }
+}
+
+void WayScale::move(const Rigid3& cur_from_prev, double time_s, double pixel_units) {
+  if (stations_.empty()) {
+    restart(time_s);
+    return;
+  }
+  pixel_units_ = pixel_units;
+  now_from_station_ = cur_from_prev * now_from_station_;
+  const double moved = now_from_station_.translation.norm();
+  if (time_s - stations_.back().time_s > kMaxStay_s) {
+    restart(time_s);
+  } else if (moved > 0.0 && moved >= kStation_px * pixel_units) {
+    stations_.push_back({time_s, stations_.back().length + moved});
+    now_from_station_ = {};
+  }
+  while (stations_.front().time_s < time_s - kMemory_s) {
+    stations_.pop_front();
+  }
+}
+
+void WayScale::rescale(double factor) {
+  for (Station& station : stations_) {
+    station.length *= factor;
+  }
+  now_from_station_.translation *= factor;
+}
+
+void WayScale::add(const std::vector<Way>& ways) {
+  held_.reset();
+  for (const Way& way : ways) {
+    if (way.kind == Way::Kind::kHeld) {
+      held_ = way;
+    } else {
+      queues_[static_cast<std::size_t>(way.kind)].waiting.push_back(way);
+    }
+  }
+}
+
+double WayScale::length_at(double time_s) const {
+  const auto after = std::ranges::lower_bound(stations_, time_s, {}, &Station::time_s);
+  if (after == stations_.begin() || after == stations_.end()) {
+    return after == stations_.end() ? stations_.back().length : after->length;
+  }
+  const Station& before = *std::prev(after);
+  const double share = (time_s - before.time_s) / (after->time_s - before.time_s);
+  return before.length + share * (after->length - before.length);
+}
+
+bool WayScale::covers(const Way& way) const {
+  return way.from_s >= stations_.front().time_s && way.to_s <= stations_.back().time_s;
+}
+
+void WayScale::join_ended(Queue& queue) const {
+  auto& [waiting, joined] = queue;
+  for (; !waiting.empty() && waiting.front().to_s <= stations_.back().time_s; waiting.pop_front()) {
+    const Way& way = waiting.front();
+    if (joined && std::abs(way.from_s - joined->to_s) < kSameTime_s) {
+      joined->to_s = way.to_s;
+      joined->metres += way.metres;
+      joined->sigma_m = std::hypot(joined->sigma_m, way.sigma_m);
+    } else {
+      joined = way;
+    }
+    if (!covers(*joined)) {
+      joined.reset();
+    }
+  }
+}
+
+bool WayScale::measure(Queue& queue, ScaleFilter& filter) const {
+  join_ended(queue);
+  if (!queue.joined) {
+    return false;
+  }
+  const Way& way = *queue.joined;
+  const double units = length_at(way.to_s) - length_at(way.from_s);
+  if (!(units > 0.0 && units >= kStation_px * pixel_units_ &&
+        way.metres > kMinWaySigmas * way.sigma_m)) {
+    return false;  // goes on
+  }
+  const double sigma =
+      std::hypot(way.sigma_m / way.metres, std::sqrt(2.0) * kPlace_px * pixel_units_ / units);
+  const bool is_believed = filter.update(std::log(way.metres / units), sigma, ScaleWitness::kWay);
+  queue.joined.reset();
+  return is_believed;
+}
+
+void WayScale::guess(ScaleFilter& filter) const {
+  double metres = 0.0;
+  double units = 0.0;
+  const auto add_part = [&](const Way& way) {
+    const double from_s = std::max(way.from_s, stations_.front().time_s);
+    const double to_s = std::min(way.to_s, stations_.back().time_s);
+    if (from_s < to_s) {
+      metres += way.metres * (to_s - from_s) / (way.to_s - way.from_s);
+      units += length_at(to_s) - length_at(from_s);
+    }
+  };
+  for (const Queue& queue : queues_) {
+    std::ranges::for_each(queue.waiting, add_part);
+    if (queue.joined) {
+      add_part(*queue.joined);
+    }
+  }
+  if (held_) {
+    add_part(*held_);
+  }
+  if (metres > 0.0 && units > 0.0) {
+    filter.update(std::log(metres / units), ScaleFilter::kUnknownSigma, ScaleWitness::kWay);
+  }
+}
+
+bool WayScale::measure(ScaleFilter& filter) {
+  bool is_believed = false;
+  if (!stations_.empty()) {
+    for (Queue& queue : queues_) {
+      is_believed = measure(queue, filter) || is_believed;
+    }
+    if (!filter.is_initialized()) {
+      guess(filter);
+    }
+  }
+  return is_believed;
 }
 
 }  // namespace stemvo

@@ -15,7 +15,7 @@
 #include "odometry/metric_scale.hpp"
 #include "odometry/motion_covariance.hpp"
 #include "odometry/motion_model.hpp"
-#include "odometry/moving_tracks.hpp"
+#include "odometry/moving_things.hpp"
 #include "odometry/self_calibration.hpp"
 #include "odometry/window.hpp"
 #include "odometry/window_history.hpp"

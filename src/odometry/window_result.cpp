@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "geometry/median.hpp"
-#include "odometry/road_landmarks.hpp"
+#include "odometry/metric_scale.hpp"
 #include "odometry/window_estimator.hpp"
 
 namespace stemvo {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "geometry/decomposition.hpp"
 #include "geometry/median.hpp"
 #include "geometry/pose_refinement.hpp"
-#include "geometry/sampson.hpp"
+#include "geometry/residuals.hpp"
+#include "geometry/two_view_models.hpp"
 #include "support/matchers.hpp"
 #include "support/numeric_jacobian.hpp"
 #include "support/synthetic_scene.hpp"

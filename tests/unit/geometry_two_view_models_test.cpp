@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "geometry/decomposition.hpp"
-#include "geometry/two_view_scores.hpp"
+#include "geometry/two_view_models.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
 #include "support/test.hpp"

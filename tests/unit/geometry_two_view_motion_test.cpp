@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "geometry/decomposition.hpp"
 #include "geometry/triangulation.hpp"
+#include "geometry/two_view_models.hpp"
 #include "geometry/two_view_motion.hpp"
 #include "stemvo/camera.hpp"
 #include "support/matchers.hpp"

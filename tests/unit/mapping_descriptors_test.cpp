@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "mapping/descriptors.hpp"
-#include "mapping/place_index.hpp"
+#include "mapping/place_candidates.hpp"
 #include "support/kept_places.hpp"
 #include "support/test.hpp"
 

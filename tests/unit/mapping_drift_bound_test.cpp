@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "mapping/drift_bound.hpp"
+#include "mapping/pose_graph.hpp"
 #include "support/test.hpp"
 
 namespace stemvo {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "geometry/similarity_refinement.hpp"
+#include "geometry/pose_refinement.hpp"
 #include "mapping/place_check.hpp"
 #include "support/kept_places.hpp"
 #include "support/test.hpp"

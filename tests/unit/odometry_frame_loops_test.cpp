@@ -3,7 +3,7 @@
 #include <mutex>
 #include <new>
 
-#include "odometry/frame_loops.hpp"
+#include "odometry/odometry_loops.hpp"
 #include "support/test.hpp"
 
 namespace stemvo {

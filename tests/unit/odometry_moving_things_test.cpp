@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "odometry/cell_votes.hpp"
-#include "odometry/moving_tracks.hpp"
+#include "odometry/moving_things.hpp"
 #include "odometry/window_estimator.hpp"
 #include "support/estimator_run.hpp"
 #include "support/test.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "odometry/road/estimators.hpp"
+#include "odometry/road/model.hpp"
 #include "odometry/road/region.hpp"
 #include "support/road_scene.hpp"
 #include "support/test.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "odometry/road_landmarks.hpp"
+#include "odometry/metric_scale.hpp"
 #include "support/test.hpp"
 
 namespace stemvo {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "odometry/road/path.hpp"
 #include "odometry/road/region.hpp"
 #include "odometry/road/scale.hpp"
 #include "support/road_scene.hpp"

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "odometry/road/estimators.hpp"
+#include "odometry/road/model.hpp"
 #include "odometry/road/region.hpp"
 
 namespace stemvo {

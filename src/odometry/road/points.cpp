@@ -9,7 +9,7 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "geometry/median.hpp"
-#include "odometry/road/estimators.hpp"
+#include "odometry/road/model.hpp"
 #include "odometry/road/region.hpp"
 
 namespace stemvo {

@@ -1,14 +1,31 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <optional>
+#include <span>
 #include <vector>
 
+#include <Eigen/Core>
+
+#include "features/front_end.hpp"
 #include "geometry/pixel_pairs.hpp"
 #include "odometry/two_view_estimator.hpp"
 #include "stemvo/camera.hpp"
+#include "stemvo/options.hpp"
 
 namespace stemvo {
+
+/// How much of an image agrees: each square cell that shows points, a twelfth of the width that all
+/// of them span, has one vote, shared by its points. So a textured thing has no more votes than its
+/// size gives it. `agrees`: one flag per point.
+[[nodiscard]] double cell_votes(std::span<const Eigen::Vector2d> uv,
+                                const std::vector<char>& agrees);
+
+/// For each point the share of its cell's points that agree.
+[[nodiscard]] std::vector<double> cell_shares(std::span<const Eigen::Vector2d> uv,
+                                              const std::vector<char>& agrees);
 
 /// Two motions that exclude each other, each with matches of its own: the camera's through the
 /// world, and a thing's that moves by itself.
@@ -34,5 +51,30 @@ struct MotionRivals {
                                                       const Camera& camera,
                                                       const TwoViewOptions& options,
                                                       const TwoViewEstimator& estimator);
+
+/// Tracks of things that move on their own: neither landmarks nor voters. They are followed, so
+/// that no new corner of the same thing takes their place each frame.
+class MovingTracks {
+ public:
+  explicit MovingTracks(const Options& config) : options_(config.two_view), seed_(config.seed) {}
+
+  void clear() { evidence_.clear(); }
+  /// `moving_mask`, one per match: these move as a thing does.
+  void begin(const Matches& matches, const std::vector<char>& moving_mask);
+  /// A localized frame: tracks join that move as the things do, those leave that move as the world
+  /// does. `fits_world`: one per match.
+  void observe(const Matches& matches, const std::vector<char>& fits_world);
+
+  [[nodiscard]] bool empty() const { return evidence_.empty(); }
+  /// One per match.
+  [[nodiscard]] std::vector<char> flags(const Matches& matches) const;
+  /// Clears their flags in a mask, one per match.
+  void leave_out(const Matches& matches, std::vector<char>& mask) const;
+
+ private:
+  TwoViewOptions options_;
+  std::uint64_t seed_;
+  std::map<int, int> evidence_;  ///< by track id: frames for a thing less those for the world
+};
 
 }  // namespace stemvo

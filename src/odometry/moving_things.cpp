@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/moving_things.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "geometry/two_view_models.hpp"
+#include "odometry/robust_models.hpp"
+#include "odometry/tracks.hpp"
+
+namespace stemvo {
+namespace {
+
+constexpr double kCellsInRow = 12.0;
+
+class CellCount {
+ public:
+  CellCount(std::span<const Eigen::Vector2d> uv, const std::vector<char>& agrees) {
+    double least = 0.0;
+    double most = 0.0;
+    for (std::size_t i = 0; i < uv.size(); ++i) {
+      least = i == 0 ? uv[i].x() : std::min(least, uv[i].x());
+      most = i == 0 ? uv[i].x() : std::max(most, uv[i].x());
+    }
+    cell_px_ = std::max(1.0, (most - least) / kCellsInRow);
+    for (std::size_t i = 0; i < uv.size(); ++i) {
+      Cell& cell = cells_[place_of(uv[i])];
+      ++cell.num_points;
+      cell.num_agreeing += agrees[i] != 0 ? 1 : 0;
+    }
+  }
+
+  [[nodiscard]] double share_at(const Eigen::Vector2d& uv) const {
+    return share(cells_.at(place_of(uv)));
+  }
+  [[nodiscard]] double votes() const {
+    double sum = 0.0;
+    for (const auto& [place, cell] : cells_) {
+      sum += share(cell);
+    }
+    return sum;
+  }
+
+ private:
+  struct Cell {
+    int num_points = 0;
+    int num_agreeing = 0;
+  };
+  using Place = std::pair<int, int>;
+
+  static double share(const Cell& cell) {
+    return static_cast<double>(cell.num_agreeing) / cell.num_points;
+  }
+  [[nodiscard]] Place place_of(const Eigen::Vector2d& uv) const {
+    return {static_cast<int>(uv.x() / cell_px_), static_cast<int>(uv.y() / cell_px_)};
+  }
+
+  double cell_px_ = 1.0;
+  std::map<Place, Cell> cells_;
+};
+
+/// A party of fewer of the image's cells is noise, or too small to mislead.
+constexpr double kMinParty = 0.15;
+/// A motion explains matches where so many of their votes agree.
+constexpr double kExplains = 0.75;
+/// Depth counts so many times.
+constexpr double kDepthWeight = 2.0;
+
+std::vector<char> inverted(std::vector<char> mask) {
+  for (char& flag : mask) {
+    flag = flag != 0 ? 0 : 1;
+  }
+  return mask;
+}
+
+MeasuredMotion measure_party(const std::vector<char>& party,
+                             const PixelPairs& pairs,
+                             const Camera& camera,
+                             const TwoViewEstimator& estimator) {
+  const auto prev = select(pairs.prev_uv, party);
+  const auto cur = select(pairs.cur_uv, party);
+  return estimator.measure({prev, cur}, camera, /*is_initializing=*/true);
+}
+
+/// Matches, the party's own or not, that a motion explains.
+std::vector<char> explained(const MeasuredMotion& motion,
+                            const PixelPairs& pairs,
+                            const Camera& camera,
+                            double bound_px) {
+  if (motion.state == FrameState::kRotating || motion.state == FrameState::kStationary) {
+    return score_homography(
+               camera.matrix() * motion.cur_from_prev.rotation_matrix() * camera.matrix().inverse(),
+               pairs, bound_px / 2.0)
+        .inlier_mask;
+  }
+  return epipolar_inliers(motion.cur_from_prev, pairs, camera, bound_px);
+}
+
+/// Evidence of a track when it is taken for a thing's, and the most it can have.
+constexpr int kFirstEvidence = 2;
+constexpr int kMostEvidence = 5;
+
+}  // namespace
+
+double cell_votes(std::span<const Eigen::Vector2d> uv, const std::vector<char>& agrees) {
+  return CellCount(uv, agrees).votes();
+}
+
+std::vector<double> cell_shares(std::span<const Eigen::Vector2d> uv,
+                                const std::vector<char>& agrees) {
+  const CellCount count(uv, agrees);
+  std::vector<double> shares;
+  shares.reserve(uv.size());
+  for (const Eigen::Vector2d& point : uv) {
+    shares.push_back(count.share_at(point));
+  }
+  return shares;
+}
+
+std::vector<char> scatter(const std::vector<char>& flags, const std::vector<char>& party) {
+  std::vector<char> scattered(party.size(), 0);
+  auto flag = flags.begin();
+  for (std::size_t i = 0; i < party.size(); ++i) {
+    scattered[i] = party[i] != 0 ? *flag++ : char{0};
+  }
+  return scattered;
+}
+
+std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
+                                        const PixelPairs& pairs,
+                                        const Camera& camera,
+                                        const TwoViewOptions& options,
+                                        const TwoViewEstimator& estimator) {
+  if (!all.homography.has_value()) {
+    return std::nullopt;
+  }
+  const std::vector<char> plane =
+      score_homography(*all.homography, pairs, options.sigma_px).inlier_mask;
+  const std::vector<char> rest = inverted(plane);
+  const auto votes = [&](const std::vector<char>& agrees) {
+    return cell_votes(pairs.cur_uv, agrees);
+  };
+  const double plane_votes = votes(plane);
+  const double rest_votes = votes(rest);
+  const double least = kMinParty * (plane_votes + rest_votes);
+  if (std::min(plane_votes, rest_votes) < least) {
+    return std::nullopt;
+  }
+  MeasuredMotion other = measure_party(rest, pairs, camera, estimator);
+  std::vector<char> other_mask = scatter(other.inlier_mask, rest);
+  const double other_votes = votes(other_mask);
+  if (other.state == FrameState::kLost || other_votes < least) {
+    return std::nullopt;
+  }
+  std::vector<char> both = explained(other, pairs, camera, 2.0 * options.inlier_threshold_px);
+  std::transform(both.begin(), both.end(), plane.begin(), both.begin(), std::logical_and<char>());
+  if (votes(both) >= kExplains * plane_votes) {
+    return std::nullopt;
+  }
+  const bool has_depth = other.homography_ratio <= options.homography_ratio;
+  if ((has_depth ? kDepthWeight : 1.0) * other_votes > plane_votes) {
+    return MotionRivals{std::move(other), rest, plane, false};
+  }
+  MeasuredMotion world = measure_party(plane, pairs, camera, estimator);
+  if (world.state == FrameState::kLost) {
+    return std::nullopt;
+  }
+  // The other one's depth may yet show.
+  const bool is_contested = kDepthWeight * other_votes > plane_votes;
+  return MotionRivals{std::move(world), plane, std::move(other_mask), is_contested};
+}
+
+void MovingTracks::begin(const Matches& matches, const std::vector<char>& moving_mask) {
+  clear();
+  for (const int track_id : select<int>(matches.track_ids, moving_mask)) {
+    evidence_.emplace(track_id, kFirstEvidence);
+  }
+}
+
+void MovingTracks::observe(const Matches& matches, const std::vector<char>& fits_world) {
+  if (empty()) {
+    return;
+  }
+  const std::vector<char> moving = flags(matches);
+  const std::optional<Eigen::Matrix3d> motion =
+      estimate_homography({select<Eigen::Vector2d>(matches.prev_uv, moving),
+                           select<Eigen::Vector2d>(matches.cur_uv, moving)},
+                          options_, seed_);
+  std::map<int, int> before = std::exchange(evidence_, {});
+  if (!motion.has_value()) {
+    return;
+  }
+  const std::vector<char> fits_thing =
+      score_homography(*motion, {matches.prev_uv, matches.cur_uv}, options_.inlier_threshold_px)
+          .inlier_mask;
+  const std::vector<double> shares = cell_shares(matches.cur_uv, moving);
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    const int vote = (fits_thing[i] != 0 ? 1 : 0) - (fits_world[i] != 0 ? 1 : 0);
+    const bool joins = fits_thing[i] != 0 && (fits_world[i] == 0 || shares[i] > 0.5);
+    const int evidence = moving[i] != 0
+                             ? std::min(before[matches.track_ids[i]] + vote, kMostEvidence)
+                             : (joins ? kFirstEvidence : 0);
+    if (evidence > 0) {
+      evidence_.emplace(matches.track_ids[i], evidence);
+    }
+  }
+}
+
+std::vector<char> MovingTracks::flags(const Matches& matches) const {
+  std::vector<char> mask(matches.track_ids.size());
+  std::transform(matches.track_ids.begin(), matches.track_ids.end(), mask.begin(),
+                 [&](int track_id) { return static_cast<char>(evidence_.contains(track_id)); });
+  return mask;
+}
+
+void MovingTracks::leave_out(const Matches& matches, std::vector<char>& mask) const {
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    mask[i] = evidence_.contains(matches.track_ids[i]) ? char{0} : mask[i];
+  }
+}
+
+}  // namespace stemvo
