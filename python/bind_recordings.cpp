@@ -97,7 +97,7 @@ nb::tuple frame_of(const FrameSource& source, std::size_t index) {
 
 nb::object truth_of(const FrameSource& source) {
   const auto& truth = source.ground_truth;
-  return truth ? nb::cast(array_of(*truth)) : nb::none();
+  return truth ? nb::cast(array_of(truth->poses)) : nb::none();
 }
 
 nb::object truth_frames_of(const FrameSource& source) {

@@ -121,7 +121,7 @@ Expected<cv::Size> look_at_video(const BoardRequest& request,
     }
     report.interrupted = progress && !progress(i + 1, std::max(num_frames, i + 2));
   }
-  return stream->size();
+  return stream->decoder().size;
 }
 
 std::string file_text(const BoardRequest& request, const BoardReport& report) {

@@ -2,7 +2,6 @@
 #include "dataset/camera_file.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <string>
@@ -21,31 +20,27 @@
 namespace stemvo::dataset {
 namespace {
 
-using Numbers = std::vector<double>;
-
 /// The names by which a kind of camera file says what ours says.
 struct Format {
   std::string width = "image_width";
   std::string height = "image_height";
   std::string intrinsics = "intrinsics";
-  std::size_t num_intrinsics = 4;
-  std::string intrinsics_form = "[fx, fy, cx, cy]";
-  std::array<std::size_t, 4> places = {0, 1, 2, 3};  ///< of fx, fy, cx, cy among them
   std::string coefficients = "distortion_coefficients";
-  std::string projection = "projection_matrix";
   std::string body = "T_BS";
-  bool has_more_keys = false;  ///< else a key that is not read is an error
+  std::string projection = {};
+  std::string intrinsics_form = "[fx, fy, cx, cy]";
+  bool is_of_matrices = false;  ///< nine intrinsics, row by row
+  bool has_more_keys = false;   ///< else a key that is not read is an error
 
   [[nodiscard]] std::vector<std::string> keys() const {
     std::vector<std::string> keys = {
         width,        height, "resolution", "camera_model", intrinsics, "distortion_model",
         coefficients, body,   "rate_hz",    "camera_height"};
-    if (is_of_matrices()) {
+    if (is_of_matrices) {
       keys.insert(keys.end(), {projection, "roi", "binning_x", "binning_y"});
     }
     return keys;
   }
-  [[nodiscard]] bool is_of_matrices() const { return num_intrinsics == 9; }
 };
 
 const Format kKalibr = {
@@ -53,37 +48,22 @@ const Format kKalibr = {
 
 /// OpenCV's and ROS'.
 const Format kMatrices = {.intrinsics = "camera_matrix",
-                          .num_intrinsics = 9,
+                          .projection = "projection_matrix",
                           .intrinsics_form = "data: [fx, 0, cx, 0, fy, cy, 0, 0, 1]",
-                          .places = {0, 4, 2, 5},
+                          .is_of_matrices = true,
                           .has_more_keys = true};
 
-/// ROS' message as `topic echo` prints it.
-const Format kMessage = {.width = "width",
-                         .height = "height",
-                         .intrinsics = "k",
-                         .num_intrinsics = 9,
-                         .intrinsics_form = "[fx, 0, cx, 0, fy, cy, 0, 0, 1]",
-                         .places = kMatrices.places,
-                         .coefficients = "d",
-                         .projection = "p",
-                         .has_more_keys = true};
-
-/// The same in capitals.
-Format message_of_ros_1() {
-  Format format = kMessage;
-  format.intrinsics = "K";
-  format.coefficients = "D";
-  format.projection = "P";
-  return format;
+/// ROS' message as `topic echo` prints it: k, d and p, in ROS 1 K, D and P.
+Format message(const char* k, const char* d, const char* p) {
+  return {"width", "height", k, d, "T_BS", p, "[fx, 0, cx, 0, fy, cy, 0, 0, 1]", true, true};
 }
 
 /// `map` is the document, a map.
 Format format_of(const YAML::Node& map) {
   return map["cam0"] && map["cam0"].IsMap() ? kKalibr
          : map["camera_matrix"]             ? kMatrices
-         : map["k"]                         ? kMessage
-         : map["K"]                         ? message_of_ros_1()
+         : map["k"]                         ? message("k", "d", "p")
+         : map["K"]                         ? message("K", "D", "P")
                                             : Format();
 }
 
@@ -91,15 +71,14 @@ Format format_of(const YAML::Node& map) {
 Status add_numbers(const YAML::Node& list, bool may_have_rows, std::vector<double>& numbers) {
   constexpr std::size_t kMost = 16;
   for (const YAML::Node& element : list) {
-    const bool is_row = may_have_rows && element.IsSequence();
-    const Status status = is_row ? add_numbers(element, false, numbers)
-                                 : parse_numbers(element.IsScalar() ? element.Scalar() : "", 1)
-                                       .and_then([&](const std::vector<double>& one) {
-                                         numbers.push_back(one.front());
-                                         return Status();
-                                       });
-    if (!status || numbers.size() > kMost) {
-      return status ? fail(fmt::format("expected at most {} numbers, found more", kMost)) : status;
+    if (may_have_rows && element.IsSequence()) {
+      STEMVO_TRY(add_numbers(element, false, numbers));
+    } else {
+      STEMVO_TRY_GET(const auto one, parse_numbers(element.IsScalar() ? element.Scalar() : "", 1));
+      numbers.push_back(one.front());
+    }
+    if (numbers.size() > kMost) {
+      return fail(fmt::format("expected at most {} numbers, found more", kMost));
     }
   }
   return {};
@@ -158,27 +137,27 @@ class Reader {
     for (const auto& entry : map) {
       const YAML::Node& value = entry.second;
       const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";
-      const auto line = static_cast<std::size_t>(entry.first.Mark().line);
       if (std::ranges::find(known, key) != known.end()) {
         const bool is_matrix = value.IsMap() && value["data"];  // {rows, cols, data: [..]}
         if (!values_.emplace(key, is_matrix ? value["data"] : value).second) {
-          return fail_at(file_, line, fail(key + ": duplicated key"));
+          return at(entry.first, key + ": duplicated key");
         }
       } else if (!format_.has_more_keys && key != "sensor_type" && key != "comment") {  // EuRoC's
-        return fail_at(file_, line,
-                       fail(fmt::format("{}: unknown key; known keys: {}", one_line(key),
-                                        fmt::join(known, ", "))));
+        return at(entry.first, fmt::format("{}: unknown key; known keys: {}", one_line(key),
+                                           fmt::join(known, ", ")));
       }
     }
     return {};
   }
 
+  [[nodiscard]] Error at(const YAML::Node& node, const std::string& problem) const {
+    return fail_at(file_, static_cast<std::size_t>(node.Mark().line), fail(problem));
+  }
   [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }
   void refuse(const Error& error) { status_ = status_ ? Status(error) : status_; }
   /// "<file>:<line>: <key>: <problem>"
   void refuse(const std::string& key, const std::string& problem) {
-    const auto line = static_cast<std::size_t>(values_.at(key).Mark().line);
-    refuse(fail_at(file_, line, fail(key + ": " + problem)));
+    refuse(at(values_.at(key), key + ": " + problem));
   }
   void miss(const std::string& expected) {
     refuse(fail(fmt::format("{}: expected {}, found no such key", file_.string(), expected)));
@@ -231,18 +210,23 @@ class Reader {
       refuse(key, read.error().message);
     } else {
       const std::size_t count = numbers.size();
-      drop_zeros(key, lengths.back(), numbers);
+      // OpenCV and ROS write coefficients with the zeros of models that have more.
+      while (key == format_.coefficients && numbers.size() > lengths.back() &&
+             numbers.back() == 0.0) {
+        numbers.pop_back();
+      }
       if (std::ranges::find(lengths, numbers.size()) == lengths.end()) {
         refuse(key, fmt::format("expected {}, found {} numbers", expected, count));
       }
     }
     return numbers;
   }
-  /// OpenCV and ROS write coefficients with the zeros of models that have more.
-  void drop_zeros(const std::string& key, std::size_t most, std::vector<double>& numbers) const {
-    while (key == format_.coefficients && numbers.size() > most && numbers.back() == 0.0) {
-      numbers.pop_back();
-    }
+  /// Nullopt: there is no list of numbers.
+  std::optional<std::vector<double>> readable_list(const std::string& key) const {
+    std::vector<double> numbers;
+    return has(key) && values_.at(key).IsSequence() && add_numbers(values_.at(key), true, numbers)
+               ? std::optional(numbers)
+               : std::nullopt;
   }
 
   void set_size(Camera& camera) {
@@ -265,23 +249,21 @@ class Reader {
 
   void set_intrinsics(Camera& camera) {
     const std::string& key = format_.intrinsics;
-    const auto numbers = list(key, {format_.num_intrinsics}, format_.intrinsics_form);
+    const auto n = list(key, {format_.is_of_matrices ? 9U : 4U}, format_.intrinsics_form);
     if (!status_) {
       return;
     }
-    const auto& places = format_.places;
-    camera.fx_px = numbers[places[0]];
-    camera.fy_px = numbers[places[1]];
-    camera.cx_px = numbers[places[2]];
-    camera.cy_px = numbers[places[3]];
-    if (format_.is_of_matrices() && (numbers[1] != 0.0 || numbers[3] != 0.0 || numbers[6] != 0.0 ||
-                                     numbers[7] != 0.0 || numbers[8] != 1.0)) {
+    const bool is_matrix = format_.is_of_matrices;
+    camera.fx_px = n[0];
+    camera.fy_px = n[is_matrix ? 4 : 1];
+    camera.cx_px = n[2];
+    camera.cy_px = n[is_matrix ? 5 : 3];
+    if (is_matrix && (n[1] != 0.0 || n[3] != 0.0 || n[6] != 0.0 || n[7] != 0.0 || n[8] != 1.0)) {
       refuse(key, fmt::format("expected {} without skew, found [{}]", format_.intrinsics_form,
-                              fmt::join(numbers, ", ")));
+                              fmt::join(n, ", ")));
     }
     if (const Status status = check_camera(camera, key); !status) {
-      const auto line = static_cast<std::size_t>(values_.at(key).Mark().line);
-      refuse(fail_at(file_, line, status.error()));
+      refuse(at(values_.at(key), status.error().message));
     }
   }
 
@@ -296,14 +278,15 @@ class Reader {
       return;
     }
     const YAML::Node& roi = values_.at("roi");
-    const auto is_one_of = [&](std::size_t place, const char* key, int value) {
-      const YAML::Node found = roi.IsMap() ? roi[key] : roi[place];
-      return !found || (found.IsScalar() &&
-                        (found.Scalar() == "0" || found.Scalar() == std::to_string(value)));
-    };
-    if (!(roi.IsMap() || (roi.IsSequence() && roi.size() == 4)) || !is_one_of(0, "x_offset", 0) ||
-        !is_one_of(1, "y_offset", 0) || !is_one_of(2, "width", camera.width_px) ||
-        !is_one_of(3, "height", camera.height_px)) {
+    const int whole[] = {0, 0, camera.width_px, camera.height_px};
+    bool is_whole = roi.IsMap() || (roi.IsSequence() && roi.size() == 4);
+    for (std::size_t i = 0; is_whole && i < 4; ++i) {
+      constexpr const char* kKeys[] = {"x_offset", "y_offset", "width", "height"};
+      const YAML::Node found = roi.IsMap() ? roi[kKeys[i]] : roi[i];
+      const std::string text = found && found.IsScalar() ? found.Scalar() : "";
+      is_whole = !found || text == "0" || text == std::to_string(whole[i]);
+    }
+    if (!is_whole) {
       refuse("roi", "expected the whole image, for K is of that, found a part");
     }
   }
@@ -312,19 +295,18 @@ class Reader {
   void check_projection(CameraFile& result) {
     const std::string& key = format_.projection;
     const Camera& camera = result.camera;
-    Numbers p;
-    if (!status_ || !has(key) || !values_.at(key).IsSequence() ||
-        !add_numbers(values_.at(key), true, p) || p.size() != 12) {
+    const auto numbers = readable_list(key);
+    if (!status_ || !numbers || numbers->size() != 12) {
       return;
     }
-    const auto is_near = [](double a, double b) { return std::abs(a - b) < 0.01; };
-    if (p[0] > 0.0 && is_distorted(camera) &&
-        !(is_near(p[0], camera.fx_px) && is_near(p[5], camera.fy_px) &&
-          is_near(p[2], camera.cx_px) && is_near(p[6], camera.cy_px))) {
+    const auto& p = *numbers;
+    const Eigen::Array4d off =
+        Eigen::Array4d(p[0], p[5], p[2], p[6]) -
+        Eigen::Array4d(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px);
+    if (p[0] > 0.0 && is_distorted(camera) && !(off.abs() < 0.01).all()) {
       result.warnings.push_back(fmt::format(
           "{}: taken for images as the sensor gives them ({} and {}); those that are rectified "
-          "have "
-          "intrinsics [{}, {}, {}, {}], of {}, and no distortion",
+          "have intrinsics [{}, {}, {}, {}], of {}, and no distortion",
           file_.string(), format_.intrinsics, format_.coefficients, p[0], p[5], p[2], p[6], key));
     }
   }
@@ -332,18 +314,17 @@ class Reader {
   void set_distortion(Camera& camera) {
     const std::string& key = format_.coefficients;
     // ROS names no model where there is no lens.
-    Numbers numbers;
-    const bool has_none = format_.is_of_matrices() && has(key) && values_.at(key).IsSequence() &&
-                          add_numbers(values_.at(key), true, numbers) &&
-                          std::ranges::all_of(numbers, [](double k) { return k == 0.0; });
-    const bool is_unnamed = format_.is_of_matrices() && scalar("distortion_model").empty();
+    const auto found = readable_list(key);
+    const bool has_none = format_.is_of_matrices && found &&
+                          std::ranges::all_of(*found, [](double k) { return k == 0.0; });
+    const bool is_unnamed = format_.is_of_matrices && scalar("distortion_model").empty();
     std::string model =
         is_unnamed && (has_none || !has("distortion_model"))
             ? (is_fisheye_ ? "fisheye" : "plumb_bob")
             : choice("distortion_model", {"none", "radial-tangential", "radtan", "plumb_bob",
                                           "rational_polynomial", "equidistant", "fisheye"});
-    const bool is_empty = has_none && numbers.empty();
-    numbers.clear();
+    const bool is_empty = has_none && found->empty();
+    std::vector<double> numbers;
     if (model.empty()) {
       miss("distortion_model: none, radial-tangential or equidistant");
     } else if (model == "none" || is_empty) {

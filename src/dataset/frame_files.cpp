@@ -90,12 +90,8 @@ Status add_ground_truth(FrameSource& frames,
     return fail(fmt::format("{}: expected a pose for each of {} images, found {} poses",
                             poses.string(), num_files, truth.poses.size()));
   }
-  STEMVO_TRY_GET(const auto matched,
-                 match_frames(truth, poses, frames.range.begin, frames.timestamps_s, tolerance_s));
-  frames.ground_truth = matched.poses;
-  if (matched.frames.size() < frames.files.size()) {
-    frames.ground_truth_frames = matched.frames;
-  }
+  STEMVO_TRY_GET(frames.ground_truth,
+                 match_frames(truth, frames.range.begin, frames.timestamps_s, tolerance_s));
   return {};
 }
 

@@ -120,8 +120,7 @@ struct SharedKind {
     const std::filesystem::path& file, const std::optional<std::filesystem::path>& camera_file);
 
 /// Error: fewer than two pairs, which the spans of time may explain. `owner`: of the times.
-[[nodiscard]] Status check_pairs(const std::filesystem::path& truth_file,
-                                 std::span<const double> truth_s,
+[[nodiscard]] Status check_pairs(const PoseFile& truth,
                                  const std::string& owner,
                                  std::span<const double> times_s,
                                  const TimePairs& pairs,
@@ -130,7 +129,6 @@ struct SharedKind {
 /// The poses that frames have: by their times where the file has times, else one per frame, from
 /// pose `begin` on. Errors: fewer than two of these times; fewer poses than frames.
 [[nodiscard]] Expected<GroundTruth> match_frames(const PoseFile& truth,
-                                                 const std::filesystem::path& truth_file,
                                                  std::size_t begin,
                                                  const std::vector<double>& times_s,
                                                  double tolerance_s);

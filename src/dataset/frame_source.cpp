@@ -2,7 +2,6 @@
 #include "dataset/frame_source.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <regex>
 #include <system_error>
 
@@ -120,20 +119,12 @@ Expected<std::optional<GroundTruth>> FrameSource::ground_truth_of(std::size_t nu
     }
     return match(times_s).map([](const GroundTruth& truth) { return std::optional(truth); });
   }
-  if (!ground_truth) {
-    return std::optional<GroundTruth>();
+  std::optional<GroundTruth> truth = ground_truth;
+  if (truth) {
+    truth->frames.erase(std::ranges::lower_bound(truth->frames, num_frames), truth->frames.end());
+    truth->poses.resize(truth->frames.size());
   }
-  GroundTruth truth{*ground_truth, {}};
-  if (ground_truth_frames) {
-    truth.frames = *ground_truth_frames;
-    const auto end = std::lower_bound(truth.frames.begin(), truth.frames.end(), num_frames);
-    truth.frames.erase(end, truth.frames.end());
-  } else {
-    truth.frames.resize(num_frames);
-    std::iota(truth.frames.begin(), truth.frames.end(), std::size_t{0});
-  }
-  truth.poses.resize(truth.frames.size());
-  return std::optional(std::move(truth));
+  return truth;
 }
 
 std::vector<std::string> FrameSource::warnings_so_far() const {

@@ -58,9 +58,7 @@ struct FrameSource {
   cv::Mat mask;  ///< of the frames as they are read: 0 where no points are wanted; empty: none
   std::vector<std::filesystem::path> files;
   std::vector<double> timestamps_s;
-  std::optional<Trajectory> ground_truth;  ///< first pose is the identity
-  /// Frames that have a pose in ground_truth; absent: all.
-  std::optional<std::vector<std::size_t>> ground_truth_frames = std::nullopt;
+  std::optional<GroundTruth> ground_truth;
   std::optional<std::filesystem::path> ground_truth_file;
   /// The calibration or camera file that was asked for; absent: calib.txt in the folder was read.
   std::optional<std::filesystem::path> given_calibration;

@@ -33,8 +33,7 @@ Expected<PoseFile> read_truth(const fs::path& file, const std::optional<fs::path
   return result;
 }
 
-Status check_pairs(const fs::path& truth_file,
-                   std::span<const double> truth_s,
+Status check_pairs(const PoseFile& truth,
                    const std::string& owner,
                    std::span<const double> times_s,
                    const TimePairs& pairs,
@@ -46,24 +45,22 @@ Status check_pairs(const fs::path& truth_file,
   return fail(fmt::format(
       "{}: expected at least {} poses within {} s of times in {}, found {}; poses are of {:.3f} to "
       "{:.3f} s, the others of {:.3f} to {:.3f} s (see --gt-tolerance)",
-      truth_file.string(), kMinPairs, tolerance_s, owner, pairs.first.size(), truth_s.front(),
-      truth_s.back(), times_s.front(), times_s.back()));
+      truth.file.string(), kMinPairs, tolerance_s, owner, pairs.first.size(),
+      truth.timestamps_s.front(), truth.timestamps_s.back(), times_s.front(), times_s.back()));
 }
 
 Expected<GroundTruth> match_frames(const PoseFile& truth,
-                                   const fs::path& truth_file,
                                    std::size_t begin,
                                    const std::vector<double>& times_s,
                                    double tolerance_s) {
   if (!truth.timestamps_s.empty()) {
     const TimePairs pairs = pair_by_time(times_s, truth.timestamps_s, tolerance_s);
-    STEMVO_TRY(
-        check_pairs(truth_file, truth.timestamps_s, "the frames", times_s, pairs, tolerance_s));
+    STEMVO_TRY(check_pairs(truth, "the frames", times_s, pairs, tolerance_s));
     return GroundTruth{relative_to_first(take_poses(truth.poses, pairs.second)), pairs.first};
   }
   if (truth.poses.size() < begin + times_s.size()) {
     return fail(fmt::format("{}: expected a pose for each of {} frames, found {} poses",
-                            truth_file.string(), begin + times_s.size(), truth.poses.size()));
+                            truth.file.string(), begin + times_s.size(), truth.poses.size()));
   }
   GroundTruth result{relative_to_first(std::span(truth.poses).subspan(begin, times_s.size())),
                      std::vector<std::size_t>(times_s.size())};

@@ -2,7 +2,6 @@
 #include "dataset/video_decoder.hpp"
 
 #include <algorithm>
-#include <string>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -14,26 +13,19 @@
 namespace stemvo::dataset {
 
 namespace {
-
 constexpr const char* kVideoModule = "libstemvo_video.so";
-
-Expected<std::unique_ptr<VideoDecoder>> open(const char* file, int number, const cv::Size& size) {
-  static const Expected<void*> found =
-      io::load_symbol(kVideoModule, kOpenDecoder, "decodes videos");
-  return found.map([&](void* open_decoder) {
-    return std::unique_ptr<VideoDecoder>(
-        reinterpret_cast<OpenDecoder*>(open_decoder)(file, number, size.width, size.height));
-  });
-}
-
 }  // namespace
 
-Expected<std::unique_ptr<VideoDecoder>> decode_file(const std::string& file, const cv::Size& size) {
-  return open(file.c_str(), 0, size);
-}
-
-Expected<std::unique_ptr<VideoDecoder>> decode_camera(int number, const cv::Size& size) {
-  return open(nullptr, number, size);
+Expected<std::optional<VideoDecoder>> open_decoder(const char* file,
+                                                   int number,
+                                                   const cv::Size& size) {
+  static const Expected<void*> found =
+      io::load_symbol(kVideoModule, kOpenDecoder, "decodes videos");
+  return found.map([&](void* open) {
+    std::optional<VideoDecoder> decoder(std::in_place);
+    return reinterpret_cast<OpenDecoder*>(open)(file, number, size, *decoder) ? decoder
+                                                                              : std::nullopt;
+  });
 }
 
 Expected<WriteFrame> encode_file(const std::filesystem::path& file,

@@ -52,13 +52,13 @@ std::string stem_of(const std::filesystem::path& path) {
 }  // namespace
 
 std::vector<std::string> warn_of_turn(const VideoStream& stream, const std::string& owner) {
-  if (stream.turned_deg() == 0.0) {
+  if (stream.decoder().turned_deg == 0) {
     return {};
   }
   return {
       fmt::format("{}: frames are turned by {} degrees, as the container asks and players do; "
                   "the camera file is one of such frames",
-                  owner, stream.turned_deg())};
+                  owner, stream.decoder().turned_deg)};
 }
 
 Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
@@ -66,7 +66,7 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                   const FrameSourceRequest& request) {
   const std::string owner = without_secrets(request.sequence_dir.string());
   const FrameRangeRequest range = request.frames.value_or(FrameRangeRequest{});
-  STEMVO_TRY(check_stream_size(stream->size(), camera.camera, owner));
+  STEMVO_TRY(check_stream_size(stream->decoder().size, camera.camera, owner));
   STEMVO_TRY_GET(const FrameView view, view_of(camera.camera, *request.camera_file));
   if (const auto& rate_hz = camera.rate_hz ? camera.rate_hz : request.rate_hz) {
     stream->set_counted_rate(*rate_hz);
@@ -95,10 +95,10 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   frames.warnings = camera.warnings;
   const auto turns = warn_of_turn(*stream, owner);
   frames.warnings.insert(frames.warnings.end(), turns.begin(), turns.end());
-  if (stream->gray_bits() > 8) {
+  if (stream->decoder().gray_bits > 8) {
     frames.warnings.push_back(fmt::format(
         "{}: of {} bits per gray level the upper 8 are taken; images of 16 bits are read whole",
-        owner, stream->gray_bits()));
+        owner, stream->decoder().gray_bits));
   }
   frames.camera_from_imu = camera.camera_from_imu();
   if (request.ground_truth) {
@@ -106,8 +106,7 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
     STEMVO_TRY(check_length(truth, frames, request));
     frames.ground_truth_file = request.ground_truth;
     frames.match = [truth, request](const std::vector<double>& times_s) {
-      return match_frames(truth, *request.ground_truth,
-                          request.frames.value_or(FrameRangeRequest{}).begin, times_s,
+      return match_frames(truth, request.frames.value_or(FrameRangeRequest{}).begin, times_s,
                           request.ground_truth_tolerance_s);
     };
   }

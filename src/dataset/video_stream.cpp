@@ -66,8 +66,8 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& fi
                                                               const cv::Size& size) {
   std::error_code code;
   // A relative path with a colon would be taken for an address.
-  STEMVO_TRY_GET(auto decoder, decode_file(fs::absolute(file, code), size));
-  if (decoder == nullptr) {
+  STEMVO_TRY_GET(auto decoder, open_decoder(fs::absolute(file, code).c_str(), 0, size));
+  if (!decoder) {
     return fail(fmt::format(
         "{}: expected a video that FFmpeg can decode, found a file it cannot (cut off, damaged, or "
         "no video)",
@@ -80,42 +80,39 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& fi
         "'ffmpeg -i IN OUT.mp4' writes frames as players show them",
         file.string()));
   }
-  return std::make_shared<VideoStream>(std::move(decoder), file.string(), false);
+  return std::make_shared<VideoStream>(*std::move(decoder), file.string(), false);
 }
 
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_address(const std::string& address,
                                                                  const cv::Size& size) {
-  STEMVO_TRY_GET(auto decoder, decode_file(address, size));
+  STEMVO_TRY_GET(auto decoder, open_decoder(address.c_str(), 0, size));
   const std::string name = without_secrets(address);
-  if (decoder == nullptr || decoder->size().empty()) {
+  if (!decoder || decoder->size.empty()) {
     return fail(
         fmt::format("{}: expected a stream of pictures that FFmpeg can decode, found none", name));
   }
-  const bool is_live = !(decoder->frame_count() > 0.0);
-  return std::make_shared<VideoStream>(std::move(decoder), name, is_live);
+  const bool is_live = !(decoder->frame_count > 0.0);
+  return std::make_shared<VideoStream>(*std::move(decoder), name, is_live);
 }
 
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_camera(int number, const cv::Size& size) {
-  STEMVO_TRY_GET(auto decoder, decode_camera(number, size));
-  if (decoder == nullptr) {
+  STEMVO_TRY_GET(auto decoder, open_decoder(nullptr, number, size));
+  if (!decoder) {
     return fail(fmt::format(
         "camera:{0}: expected a camera at /dev/video{0} that this user may read, found none; "
         "'ls -l /dev/video*' lists those there are",
         number));
   }
-  return std::make_shared<VideoStream>(std::move(decoder), fmt::format("camera:{}", number), true);
+  return std::make_shared<VideoStream>(*std::move(decoder), fmt::format("camera:{}", number), true);
 }
 
-VideoStream::VideoStream(std::unique_ptr<VideoDecoder> decoder, std::string name, bool is_live)
-    : decoder_(std::move(decoder)), name_(std::move(name)), is_live_(is_live) {}
-
 std::size_t VideoStream::expected_frames() const {
-  const double count = is_live_ ? 0.0 : decoder_->frame_count();
+  const double count = is_live_ ? 0.0 : decoder_.frame_count;
   return count > 0.0 && count < 1e12 ? static_cast<std::size_t>(count) : 0U;
 }
 
 double VideoStream::rate_hz() const {
-  const double told_hz = decoder_->rate_hz();
+  const double told_hz = decoder_.rate_hz;
   constexpr double kMax_hz = 1000.0;  // above it is FFmpeg's clock, of short raw MJPEG
   return told_hz > 0.0 && told_hz <= kMax_hz ? told_hz : counted_hz_.value_or(30.0);
 }
@@ -127,7 +124,7 @@ double VideoStream::next_time_s() {
     return since.count();
   }
   constexpr double kMinTime_s = -1e6;  // FFmpeg's number for no time is far below
-  const double told_s = kMillisecond_s * decoder_->position_ms();
+  const double told_s = kMillisecond_s * decoder_.position_ms();
   if (told_s > last_time_s_.value_or(kMinTime_s) && std::isfinite(told_s)) {
     return told_s;
   }
@@ -136,7 +133,7 @@ double VideoStream::next_time_s() {
 }
 
 bool VideoStream::grab() {
-  if (is_ended_ || !decoder_->grab()) {
+  if (is_ended_ || !decoder_.grab()) {
     is_ended_ = true;
     return false;
   }
@@ -168,7 +165,7 @@ Expected<cv::Mat> VideoStream::read(std::size_t index) {
   }
   cv::Mat image;
   if (std::exchange(is_grabbed_, false) || grab()) {
-    image = decoder_->retrieve();
+    image = decoder_.retrieve();
     times_s_.push_back(*last_time_s_);
     ++next_;
   }

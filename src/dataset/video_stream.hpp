@@ -10,6 +10,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <opencv2/core.hpp>
 
@@ -21,7 +22,7 @@ namespace stemvo::dataset {
 /// Frames of a video file or a live camera, decoded one behind the other; none is kept.
 class VideoStream {
  public:
-  /// Decoded by FFmpeg, as decode_file says. Error: no file, or not a video.
+  /// Decoded by FFmpeg, as open_decoder says. Error: no file, or not a video.
   [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open_file(
       const std::filesystem::path& file, const cv::Size& size);
   /// Live, unless what is there says how many frames it has. Error: nothing that can be decoded.
@@ -33,15 +34,14 @@ class VideoStream {
                                                                           const cv::Size& size);
   /// `is_live`: times are those of the clock, from the first frame on, and no frame is skipped to
   /// be read again; how a test plays a file as a camera.
-  VideoStream(std::unique_ptr<VideoDecoder> decoder, std::string name, bool is_live);
+  VideoStream(VideoDecoder decoder, std::string name, bool is_live)
+      : decoder_(std::move(decoder)), name_(std::move(name)), is_live_(is_live) {}
 
   /// Decodes and drops frames, before the first is read. Error: none is left to be read.
   [[nodiscard]] Status skip(std::size_t count);
 
-  [[nodiscard]] cv::Size size() const { return decoder_->size(); }
+  [[nodiscard]] const VideoDecoder& decoder() const { return decoder_; }
   [[nodiscard]] bool is_live() const { return is_live_; }
-  [[nodiscard]] double turned_deg() const { return decoder_->turned_deg(); }
-  [[nodiscard]] unsigned gray_bits() const { return decoder_->gray_bits(); }
   /// As the container says, which may be wrong; 0: it does not say.
   [[nodiscard]] std::size_t expected_frames() const;
   [[nodiscard]] double rate_hz() const;
@@ -63,7 +63,7 @@ class VideoStream {
   [[nodiscard]] bool grab();
   [[nodiscard]] double next_time_s();
 
-  std::unique_ptr<VideoDecoder> decoder_;
+  VideoDecoder decoder_;
   std::string name_;
   bool is_live_ = false;
   std::optional<double> counted_hz_;

@@ -22,13 +22,6 @@ struct AbsoluteTrajectoryError {
   double scale_m = 0.0;
   double se3_m = 0.0;
   double sim3_m = 0.0;
-
-  [[nodiscard]] double after_m(Alignment alignment) const {
-    return alignment == Alignment::kScale  ? scale_m
-           : alignment == Alignment::kSe3  ? se3_m
-           : alignment == Alignment::kSim3 ? sim3_m
-                                           : none_m;
-  }
 };
 
 /// Everything that needs ground truth. Both trajectories are first moved to start at the identity.

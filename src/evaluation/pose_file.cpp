@@ -132,8 +132,7 @@ Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Forma
   while (!lines.empty() && is_blank(lines.back())) {
     lines.pop_back();
   }
-  PoseFile result;
-  result.is_of_body = format == Format::kEuroc;
+  PoseFile result{.file = file, .is_of_body = format == Format::kEuroc};
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const std::string_view line =
         format == Format::kKitti ? lines[i] : lines[i].substr(0, lines[i].find('#'));

@@ -13,8 +13,9 @@ namespace stemvo {
 
 /// Poses of a file of any format that is known, in the order of their times.
 struct PoseFile {
-  std::vector<double> timestamps_s;  ///< empty: KITTI's, one pose per frame
-  Trajectory poses;
+  std::vector<double> timestamps_s = {};  ///< empty: KITTI's, one pose per frame
+  Trajectory poses = {};
+  std::filesystem::path file;
   bool is_of_body = false;  ///< EuRoC's: world_from_body in place of world_from_camera
 };
 

@@ -43,7 +43,7 @@ Expected<ChannelImagesReport> write_channel_images(const ChannelImagesRequest& r
       break;
     }
     STEMVO_TRY_GET(const auto channels, stem.apply_all(frame));
-    std::vector<cv::Mat> images;
+    std::vector<cv::Mat> images = {frame};
     std::vector<std::string> captions = {fmt::format("input, frame {}", number)};
     STEMVO_TRY(save(frame, number, "input"));
     for (std::size_t k = filters.begin; k < filters.end; ++k) {
@@ -51,7 +51,7 @@ Expected<ChannelImagesReport> write_channel_images(const ChannelImagesRequest& r
       captions.push_back(fmt::format("{} filter {}", request.config.stem.model, k));
       STEMVO_TRY(save(images.back(), number, fmt::format("filter_{:03}", k)));
     }
-    STEMVO_TRY(save(draw_channel_sheet(frame, images, captions), number, "sheet"));
+    STEMVO_TRY(save(draw_sheet(images, captions), number, "sheet"));
     goes_on = !progress || progress(i + 1, sequence.size());
   }
   return ChannelImagesReport{num_written, sequence.remarks()};

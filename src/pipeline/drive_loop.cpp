@@ -125,7 +125,7 @@ class DriveLoop {
     if (i > 0 && run_.request.config.scale_choice == ScaleChoice::kGroundTruth) {
       const Trajectory& estimate = run_.odometry.frames().estimator().trajectory();
       pose.translation = drive_.trajectory.back().translation +
-                         rescaled_step(estimate, *run_.sequence.ground_truth, i);
+                         rescaled_step(estimate, run_.sequence.ground_truth->poses, i);
     }
     return pose;
   }

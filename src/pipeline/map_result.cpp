@@ -48,7 +48,7 @@ MapResult finish_map(const Run& run) {
   }
   if (run.request.config.scale_choice == ScaleChoice::kGroundTruth) {
     map.trajectory = rescale_steps(
-        map.trajectory, std::span(*run.sequence.ground_truth).first(map.trajectory.size()));
+        map.trajectory, std::span(run.sequence.ground_truth->poses).first(map.trajectory.size()));
   }
   return map;
 }

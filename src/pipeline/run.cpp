@@ -36,7 +36,7 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
         "{}: expected a pose file, which scale.source=ground_truth needs, found none (see --gt)",
         file.lexically_normal().string()));
   }
-  if (sequence->stream || sequence->ground_truth_frames) {
+  if (sequence->stream || sequence->ground_truth->frames.size() < sequence->size()) {
     return fail(fmt::format(
         "{}: expected a true pose of every frame, which scale.source=ground_truth needs, found {}",
         sequence->ground_truth_file->string(),
@@ -89,10 +89,10 @@ std::string describe_truth(const RunRequest& request, const FrameSource& sequenc
   if (sequence.stream) {
     return "ground truth to be matched";
   }
-  const auto& frames = sequence.ground_truth_frames;
-  return "ground truth" + (frames
-                               ? pipeline::count_matched(request, frames->size(), sequence.size())
-                               : std::string());
+  const std::size_t count = sequence.ground_truth->frames.size();
+  return count == sequence.size()
+             ? "ground truth"
+             : "ground truth" + pipeline::count_matched(request, count, sequence.size());
 }
 
 std::string describe_size(const FrameSource& sequence) {

@@ -39,8 +39,7 @@ void cut(PoseFile& file, const FrameRange& range) {
 /// Nullopt: all of both, line by line.
 Expected<std::optional<Pairs>> pair_poses(const PoseFile& estimate,
                                           const PoseFile& truth,
-                                          const std::filesystem::path& file,
-                                          const EvaluationRequest& request) {
+                                          double tolerance_s) {
   if (estimate.timestamps_s.empty() || truth.timestamps_s.empty()) {
     if (estimate.poses.size() == truth.poses.size()) {
       return std::nullopt;
@@ -49,21 +48,18 @@ Expected<std::optional<Pairs>> pair_poses(const PoseFile& estimate,
         "{}: expected {} poses as in {}, found {} (poses are compared line by line "
         "unless both files have times, as TUM's and EuRoC's; --frames A:B takes some of the "
         "ground truth's)",
-        file.string(), truth.poses.size(), request.ground_truth.string(), estimate.poses.size()));
+        estimate.file.string(), truth.poses.size(), truth.file.string(), estimate.poses.size()));
   }
-  const TimePairs pairs =
-      pair_by_time(estimate.timestamps_s, truth.timestamps_s, request.tolerance_s);
-  STEMVO_TRY(dataset::check_pairs(request.ground_truth, truth.timestamps_s, file.string(),
-                                  estimate.timestamps_s, pairs, request.tolerance_s));
+  const TimePairs pairs = pair_by_time(estimate.timestamps_s, truth.timestamps_s, tolerance_s);
+  STEMVO_TRY(dataset::check_pairs(truth, estimate.file.string(), estimate.timestamps_s, pairs,
+                                  tolerance_s));
   return Pairs{take_poses(estimate.poses, pairs.first), take_poses(truth.poses, pairs.second)};
 }
 
 void add_row(TextTable& table, const EvaluationRow& row, Alignment alignment) {
-  const Metrics& m = row.metrics;
-  table.add({row.name, number_or_dash(m.t_rel_percent, 2), number_or_dash(m.r_rel_deg_per_100m, 3),
-             format_length(m.average_offset_m, 2), format_length(m.ate_rmse.after_m(alignment), 2),
-             fmt::format("{:.4f}", m.rpe_translation_m),
-             fmt::format("{:.4f}", m.rpe_rotation_deg)});
+  const auto texts = metric_texts(row.metrics);
+  table.add({row.name, texts[0], texts[1], texts[2],
+             texts[kAteText + static_cast<std::size_t>(alignment)], texts[8], texts[9]});
 }
 
 nlohmann::ordered_json row_json(const EvaluationRow& row) {
@@ -91,7 +87,7 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
     if (estimate.timestamps_s.empty() && estimate.poses.size() == num_lines) {
       cut(estimate, range);
     }
-    STEMVO_TRY_GET(const auto pairs, pair_poses(estimate, truth, file, request));
+    STEMVO_TRY_GET(const auto pairs, pair_poses(estimate, truth, request.tolerance_s));
     const Trajectory& compared = pairs ? pairs->estimate : estimate.poses;
     const Trajectory& with = pairs ? pairs->truth : truth.poses;
     if (compared.size() < 2) {

@@ -54,22 +54,6 @@ cv::Scalar flow_color(double share) {
   return {color[0], color[1], color[2]};
 }
 
-/// 8-bit image of a CV_32FC1 channel between its percentiles 0.5 and 99.5.
-cv::Mat stretch_for_the_eye(const cv::Mat& values) {
-  std::vector<float> sorted(values.begin<float>(), values.end<float>());
-  std::sort(sorted.begin(), sorted.end());
-  const auto percentile = [&](double share) {
-    return static_cast<double>(
-        sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))]);
-  };
-  const double low = percentile(0.005);
-  const double high = percentile(0.995);
-  const double gain = high > low ? 255.0 / (high - low) : 0.0;
-  cv::Mat image;
-  values.convertTo(image, CV_8UC1, gain, -gain * low);
-  return image;
-}
-
 /// Flow that gets the brightest colour: 95 % of the inliers are below, whole pixels.
 double longest_flow_px(const Matches& matches, const std::vector<char>& inlier_mask) {
   std::vector<double> lengths;
@@ -122,12 +106,6 @@ int height_at_width(const cv::Mat& image, int width_px) {
   return image.empty()
              ? 0
              : std::max(1, cvRound(static_cast<double>(width_px) * image.rows / image.cols));
-}
-
-/// Columns that bring the sheet nearest to its aspect.
-int count_columns(std::size_t num_cells, double cell_aspect) {
-  const double columns = std::sqrt(static_cast<double>(num_cells) * kSheetAspect / cell_aspect);
-  return std::clamp(static_cast<int>(std::lround(columns)), 1, static_cast<int>(num_cells));
 }
 
 /// Smaller by averaging; larger by repeating, so that a coarse channel shows its own pixels.
@@ -211,41 +189,28 @@ cv::Mat draw_under_caption(const cv::Mat& image,
   return result;
 }
 
-std::vector<cv::Mat> draw_channels(const cv::Mat& frame,
-                                   const std::vector<cv::Mat>& channels,
-                                   int width) {
-  STEMVO_CHECK(!frame.empty(), "a frame to show");
-  const int width_px = std::max(1, std::min(frame.cols, width));
-  const cv::Size size(width_px, height_at_width(frame, width_px));
-  std::vector<cv::Mat> images = {fit(to_rgb(frame), size)};
-  for (const cv::Mat& channel : channels) {
-    STEMVO_CHECK(!channel.empty(), "a channel to show");
-    images.push_back(
-        fit(to_rgb(channel.type() == CV_32FC1 ? stretch_for_the_eye(channel) : channel), size));
-  }
-  return images;
-}
-
-cv::Mat draw_channel_sheet(const cv::Mat& frame,
-                           const std::vector<cv::Mat>& channels,
-                           const std::vector<std::string>& captions) {
-  STEMVO_CHECK(!frame.empty(), "a frame to show");
-  STEMVO_CHECK(captions.size() == channels.size() + 1, "one caption per image");
-  const double frame_aspect = static_cast<double>(frame.cols) / frame.rows;
-  const int columns = count_columns(captions.size(), frame_aspect);
-  const int rows = (static_cast<int>(captions.size()) + columns - 1) / columns;
-  const std::vector<cv::Mat> images =
-      draw_channels(frame, channels, (kSheetWidth_px - kSheetGap_px * (columns + 1)) / columns);
-  const cv::Size cell = images.front().size();
-
-  cv::Mat sheet(kSheetGap_px + rows * (cell.height + kLabel_px + kSheetGap_px / 2),
-                kSheetGap_px + columns * (cell.width + kSheetGap_px), CV_8UC3, kPaper);
-  for (std::size_t i = 0; i < captions.size(); ++i) {
-    const int x = kSheetGap_px + (static_cast<int>(i) % columns) * (cell.width + kSheetGap_px);
-    const int y = kSheetGap_px +
-                  (static_cast<int>(i) / columns) * (cell.height + kLabel_px + kSheetGap_px / 2);
-    images[i].copyTo(sheet(cv::Rect({x, y}, cell)));
-    put_caption(sheet, {x, y + cell.height, cell.width, kLabel_px}, captions[i], kInk);
+cv::Mat draw_sheet(const std::vector<cv::Mat>& images, const std::vector<std::string>& captions) {
+  STEMVO_CHECK(!images.empty() && images.size() == captions.size(), "one caption per image");
+  const cv::Size full = images.front().size();
+  const auto count = static_cast<double>(images.size());
+  // The number that brings the sheet nearest to its aspect.
+  const double nearest =
+      std::sqrt(count * kSheetAspect / (static_cast<double>(full.width) / full.height));
+  const int columns = static_cast<int>(std::clamp(std::round(nearest), 1.0, count));
+  const int rows = (static_cast<int>(images.size()) + columns - 1) / columns;
+  const int width_px = (kSheetWidth_px - kSheetGap_px * (columns + 1)) / columns;
+  const int cell_px = std::max(1, std::min(full.width, width_px));
+  const cv::Size cell(cell_px, height_at_width(images.front(), cell_px));
+  const int step_px = cell.height + kLabel_px + kSheetGap_px / 2;
+  cv::Mat sheet(kSheetGap_px + rows * step_px, kSheetGap_px + columns * (cell.width + kSheetGap_px),
+                CV_8UC3, kPaper);
+  for (int i = 0; i < static_cast<int>(images.size()); ++i) {
+    const cv::Mat& image = images[static_cast<std::size_t>(i)];
+    const int x = kSheetGap_px + (i % columns) * (cell.width + kSheetGap_px);
+    const int y = kSheetGap_px + (i / columns) * step_px;
+    fit(to_rgb(image), cell).copyTo(sheet(cv::Rect({x, y}, cell)));
+    put_caption(sheet, {x, y + cell.height, cell.width, kLabel_px},
+                captions[static_cast<std::size_t>(i)], kInk);
   }
   return sheet;
 }

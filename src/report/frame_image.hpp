@@ -30,17 +30,10 @@ namespace stemvo {
                                          const std::string& left,
                                          const std::string& right);
 
-/// The frame, then the channels, as images of one size, at most `width` wide: CV_8UC3, RGB.
-/// Channels are CV_8UC1 (as they are) or CV_32FC1 (stretched between their 0.5 and 99.5
-/// percentiles, for the eye only).
-[[nodiscard]] std::vector<cv::Mat> draw_channels(const cv::Mat& frame,
-                                                 const std::vector<cv::Mat>& channels,
-                                                 int width);
-
-/// The paper's Figure 1: those images in a grid, each over its caption (checked).
-[[nodiscard]] cv::Mat draw_channel_sheet(const cv::Mat& frame,
-                                         const std::vector<cv::Mat>& channels,
-                                         const std::vector<std::string>& captions);
+/// The paper's Figure 1: a frame and its channels (8 bits, gray or RGB) in a grid, all at the size
+/// of the first or smaller, each over its caption (checked).
+[[nodiscard]] cv::Mat draw_sheet(const std::vector<cv::Mat>& images,
+                                 const std::vector<std::string>& captions);
 
 /// One line of text, centred in the height of `box`, `share` of the room left over before it;
 /// shrinks until it fits. OpenCV's fonts know ASCII only: any other byte becomes a '?'. Returns

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <optional>
@@ -95,6 +96,10 @@ void add_metrics(nlohmann::ordered_json& json, const std::optional<Metrics>& met
 /// The same numbers as an aligned table; each row names its alignment, the zero-motion baseline
 /// stands beside the offset. Ends with a newline.
 [[nodiscard]] std::string format_metrics_table(const MetricsReport& report);
+/// Numbers for people: t_rel, r_rel, offset, that of zero motion, the ATE after each alignment in
+/// its order from kAteText on, RPE of position and of rotation.
+[[nodiscard]] std::array<std::string, 10> metric_texts(const Metrics& metrics);
+inline constexpr std::size_t kAteText = 4;
 /// The stages as an aligned table, then what concerns the whole run. Ends with a newline.
 [[nodiscard]] std::string format_timing_table(const TimingReport& report);
 

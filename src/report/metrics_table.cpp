@@ -76,60 +76,54 @@ std::string error_table(const MetricsReport& report) {
                                    : fmt::format("mean over {} segments of {}", m.num_segments,
                                                  length_range(m.segment_lengths_m));
   const std::string fitted(to_string(m.alignment));
-  const std::optional<Metrics> in_map = report.map ? report.map->metrics : std::nullopt;
-  TextTable table(in_map ? "lrrlll" : "lrlll");
-  const auto add = [&](const char* error, const auto& shown, const std::string& unit,
-                       const std::string& alignment, const std::string& note) {
-    std::vector<std::string> row = {error, shown(m)};
-    if (in_map) {
-      row.push_back(shown(*in_map));
-    }
-    row.insert(row.end(), {unit, alignment, note});
-    table.add(row);
+  struct Row {
+    std::string error, unit, alignment, note;
   };
-  table.add(in_map ? std::vector<std::string>{"error", "value", "map", "unit", "alignment", ""}
-                   : std::vector<std::string>{"error", "value", "unit", "alignment", ""});
+  const Row rows[] = {
+      {"translation t_rel", "%", fitted, segments},
+      {"rotation r_rel", "deg/100 m", fitted, "the same segments"},
+      {"average offset", "m", fitted, "mean of |dx| + |dz|"},
+      {"  of zero motion", "m", "none", "the same for a camera that stays at the start"},
+      {"position ATE", "m", "none", "root mean square position error"},
+      {"position ATE", "m", "scale", "one scale fitted"},
+      {"position ATE", "m", "se3", "rotation and shift fitted"},
+      {"position ATE", "m", "sim3", "rotation, shift and scale fitted"},
+      {"translation per frame", "m", fitted, "mean over steps of one frame (RPE)"},
+      {"rotation per frame", "deg", fitted, "the same steps"}};
+  const auto in_map = report.map ? report.map->metrics : std::nullopt;
+  TextTable table(in_map ? "lrrlll" : "lrlll");
+  const auto add = [&](const Row& row, const std::string& value, const std::string& map) {
+    table.add(in_map ? std::vector{row.error, value, map, row.unit, row.alignment, row.note}
+                     : std::vector{row.error, value, row.unit, row.alignment, row.note});
+  };
+  add({"error", "unit", "alignment", ""}, "value", "map");
   table.rule();
-  add(
-      "translation t_rel", [](const Metrics& of) { return number_or_dash(of.t_rel_percent, 2); },
-      "%", fitted, segments);
-  add(
-      "rotation r_rel", [](const Metrics& of) { return number_or_dash(of.r_rel_deg_per_100m, 3); },
-      "deg/100 m", fitted, "the same segments");
-  add(
-      "average offset", [](const Metrics& of) { return format_length(of.average_offset_m, 2); },
-      "m", fitted, "mean of |dx| + |dz|");
-  add(
-      "  of zero motion", [](const Metrics& of) { return format_length(of.null_offset_m, 2); }, "m",
-      "none", "the same for a camera that stays at the start");
-  for (const auto& [alignment, note] :
-       {std::pair(Alignment::kNone, "root mean square position error"),
-        std::pair(Alignment::kScale, "one scale fitted"),
-        std::pair(Alignment::kSe3, "rotation and shift fitted"),
-        std::pair(Alignment::kSim3, "rotation, shift and scale fitted")}) {
-    const bool is_scaled = alignment == Alignment::kScale || alignment == Alignment::kSim3;
-    if (report.is_up_to_scale() && !is_scaled) {
-      continue;  // units against metres
+  const auto values = metric_texts(m);
+  const auto map_values = metric_texts(in_map.value_or(m));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool is_unscaled = i == kAteText || i == kAteText + 2;
+    if (!report.is_up_to_scale() || !is_unscaled) {  // else units against metres
+      add(rows[i], values[i], map_values[i]);
     }
-    add(
-        "position ATE",
-        [after = alignment](const Metrics& of) {
-          return format_length(of.ate_rmse.after_m(after), 2);
-        },
-        "m", std::string(to_string(alignment)), note);
   }
-  add(
-      "translation per frame",
-      [](const Metrics& of) { return fmt::format("{:.4f}", of.rpe_translation_m); }, "m", fitted,
-      "mean over steps of one frame (RPE)");
-  add(
-      "rotation per frame",
-      [](const Metrics& of) { return fmt::format("{:.4f}", of.rpe_rotation_deg); }, "deg", fitted,
-      "the same steps");
   return table.str();
 }
 
 }  // namespace
+
+std::array<std::string, 10> metric_texts(const Metrics& metrics) {
+  const auto& ate = metrics.ate_rmse;
+  return {number_or_dash(metrics.t_rel_percent, 2),
+          number_or_dash(metrics.r_rel_deg_per_100m, 3),
+          format_length(metrics.average_offset_m, 2),
+          format_length(metrics.null_offset_m, 2),
+          format_length(ate.none_m, 2),
+          format_length(ate.scale_m, 2),
+          format_length(ate.se3_m, 2),
+          format_length(ate.sim3_m, 2),
+          fmt::format("{:.4f}", metrics.rpe_translation_m),
+          fmt::format("{:.4f}", metrics.rpe_rotation_deg)};
+}
 
 std::string warn_of_road(const MetricsReport& report) {
   const double share = report.road_believed_fraction.value_or(1.0);

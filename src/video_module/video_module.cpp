@@ -14,44 +14,35 @@ namespace stemvo::dataset {
 
 namespace {
 
-class OpenCvDecoder final : public VideoDecoder {
- public:
-  OpenCvDecoder(const cv::VideoCapture& capture, int turned_deg)
-      : capture_(capture), turned_deg_(turned_deg) {}  // shared
-
-  bool grab() override { return capture_.grab(); }
-  cv::Mat retrieve() override {
+VideoDecoder decoder_of(cv::VideoCapture capture, int turned_deg) {  // copies share the video
+  VideoDecoder decoder;
+  decoder.size = {static_cast<int>(capture.get(cv::CAP_PROP_FRAME_WIDTH)),
+                  static_cast<int>(capture.get(cv::CAP_PROP_FRAME_HEIGHT))};
+  if (turned_deg % 180 != 0) {
+    std::swap(decoder.size.width, decoder.size.height);
+  }
+  decoder.frame_count = capture.get(cv::CAP_PROP_FRAME_COUNT);
+  decoder.rate_hz = capture.get(cv::CAP_PROP_FPS);
+  decoder.turned_deg = turned_deg;
+  const auto tag = static_cast<unsigned>(capture.get(cv::CAP_PROP_CODEC_PIXEL_FORMAT));
+  // FFmpeg's: "Y1", 0, bits; reversed where the high byte comes first.
+  decoder.gray_bits = (tag & 0xffffffU) == 0x003159U ? tag >> 24U
+                      : tag >> 8U == 0x593100U       ? tag & 0xffU
+                                                     : 8U;
+  decoder.grab = [capture]() mutable { return capture.grab(); };
+  decoder.position_ms = [capture] { return capture.get(cv::CAP_PROP_POS_MSEC); };
+  decoder.retrieve = [capture, turned_deg]() mutable {
     cv::Mat bgr;
-    if (capture_.retrieve(bgr) && turned_deg_ != 0) {
+    if (capture.retrieve(bgr) && turned_deg != 0) {
       cv::rotate(bgr, bgr,
-                 turned_deg_ == 90    ? cv::ROTATE_90_CLOCKWISE
-                 : turned_deg_ == 180 ? cv::ROTATE_180
-                                      : cv::ROTATE_90_COUNTERCLOCKWISE);
+                 turned_deg == 90    ? cv::ROTATE_90_CLOCKWISE
+                 : turned_deg == 180 ? cv::ROTATE_180
+                                     : cv::ROTATE_90_COUNTERCLOCKWISE);
     }
     return bgr;
-  }
-  cv::Size size() const override {
-    cv::Size size(static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)),
-                  static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT)));
-    if (turned_deg_ % 180 != 0) {
-      std::swap(size.width, size.height);
-    }
-    return size;
-  }
-  double frame_count() const override { return capture_.get(cv::CAP_PROP_FRAME_COUNT); }
-  double rate_hz() const override { return capture_.get(cv::CAP_PROP_FPS); }
-  double position_ms() const override { return capture_.get(cv::CAP_PROP_POS_MSEC); }
-  double turned_deg() const override { return turned_deg_; }
-  unsigned gray_bits() const override {
-    const auto tag = static_cast<unsigned>(capture_.get(cv::CAP_PROP_CODEC_PIXEL_FORMAT));
-    // FFmpeg's: "Y1", 0, bits; reversed where the high byte comes first.
-    return (tag & 0xffffffU) == 0x003159U ? tag >> 24U : tag >> 8U == 0x593100U ? tag & 0xffU : 8U;
-  }
-
- private:
-  cv::VideoCapture capture_;
-  int turned_deg_ = 0;  ///< clockwise; 0, 90, 180 or 270
-};
+  };
+  return decoder;
+}
 
 /// The turn the container asks for, clockwise. We turn frames: OpenCV 4.6 turns them the wrong way
 /// (its issue 22088), and later ones not unless they are asked.
@@ -73,28 +64,26 @@ cv::VideoCapture open_file(const char* file) {
   return cv::VideoCapture(file, cv::CAP_FFMPEG);
 }
 
-cv::VideoCapture open_camera(int number, int width_px, int height_px) {
-  cv::VideoCapture capture(number, cv::CAP_V4L2);
-  capture.set(cv::CAP_PROP_FRAME_WIDTH, width_px);
-  capture.set(cv::CAP_PROP_FRAME_HEIGHT, height_px);
-  return capture;
-}
-
 }  // namespace
 
-extern "C" __attribute__((visibility("default"))) VideoDecoder* stemvo_open_decoder(
-    const char* file, int number, int width_px, int height_px) {
+extern "C" __attribute__((visibility("default"))) bool stemvo_open_decoder(const char* file,
+                                                                           int number,
+                                                                           const cv::Size& wanted,
+                                                                           VideoDecoder& decoder) {
   cv::VideoCapture capture =
-      file != nullptr ? open_file(file) : open_camera(number, width_px, height_px);
-  if (!capture.isOpened()) {
-    return nullptr;
+      file != nullptr ? open_file(file) : cv::VideoCapture(number, cv::CAP_V4L2);
+  if (file == nullptr) {
+    capture.set(cv::CAP_PROP_FRAME_WIDTH, wanted.width);
+    capture.set(cv::CAP_PROP_FRAME_HEIGHT, wanted.height);
   }
-  const int turn_deg = file != nullptr ? asked_turn_deg(capture) : 0;
-  const cv::Size wanted(width_px, height_px);
-  auto plain = std::make_unique<OpenCvDecoder>(capture, 0);
-  auto turned = std::make_unique<OpenCvDecoder>(capture, turn_deg);
+  if (!capture.isOpened()) {
+    return false;
+  }
+  decoder = decoder_of(capture, file != nullptr ? asked_turn_deg(capture) : 0);
+  const VideoDecoder plain = decoder_of(capture, 0);
   // As players show it, but where the calibration is of the sensor's rows and columns.
-  return (turned->size() != wanted && plain->size() == wanted ? plain : turned).release();
+  decoder = decoder.size != wanted && plain.size == wanted ? plain : decoder;
+  return true;
 }
 
 extern "C" __attribute__((visibility("default"))) bool stemvo_open_writer(const char* file,

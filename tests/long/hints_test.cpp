@@ -32,7 +32,7 @@ class Hints : public ::testing::Test {
                             const Eigen::Quaterniond& off = so3_exp({0, 0, 0}),
                             std::size_t every = 1) {
     const FrameSource walk = open_kitti(folder_ / "walk/sequences/00", {}).value();
-    const Trajectory& truth = *walk.ground_truth;
+    const Trajectory& truth = walk.ground_truth->poses;
     Odometry odometry = Odometry::create(walk.camera).value();
     std::mt19937 random(3);
     std::normal_distribution<double> noise_rad(0.0, 0.2 * kDeg);

@@ -261,40 +261,30 @@ TEST_F(DoubtfulInput, SixteenBitsAreStretchedByWhatIsUsed) {
 }
 
 /// Frames without pictures' contents; times and turn as told.
-class ToldDecoder final : public dataset::VideoDecoder {
- public:
-  ToldDecoder(std::vector<double> times_ms, double turned_deg)
-      : times_ms_(std::move(times_ms)), turned_deg_(turned_deg) {}
-  bool grab() override { return ++index_ < std::ssize(times_ms_); }
-  cv::Mat retrieve() override { return {24, 32, CV_8UC3, cv::Scalar::all(90)}; }
-  [[nodiscard]] cv::Size size() const override { return {32, 24}; }
-  [[nodiscard]] double frame_count() const override { return 0.0; }
-  [[nodiscard]] double rate_hz() const override { return 20.0; }
-  [[nodiscard]] double position_ms() const override {
-    return times_ms_.at(static_cast<std::size_t>(index_));
-  }
-  [[nodiscard]] double turned_deg() const override { return turned_deg_; }
-
- private:
-  std::vector<double> times_ms_;
-  double turned_deg_;
-  std::ptrdiff_t index_ = -1;
-};
+dataset::VideoDecoder told_decoder(const std::vector<double>& times_ms, int turned_deg) {
+  const auto next = std::make_shared<std::size_t>(0);
+  return {.size = {32, 24},
+          .rate_hz = 20.0,
+          .turned_deg = turned_deg,
+          .grab = [=] { return ++*next <= times_ms.size(); },
+          .retrieve = [] { return cv::Mat(24, 32, CV_8UC3, cv::Scalar::all(90)); },
+          .position_ms = [=] { return times_ms.at(*next - 1); }};
+}
 
 class DoubtfulVideo : public DoubtfulInput {
  protected:
-  Expected<FrameSource> open(std::vector<double> times_ms, double turned_deg) const {
+  Expected<FrameSource> open(const std::vector<double>& times_ms, int turned_deg) const {
     FrameSourceRequest request = write_images({});
     request.sequence_dir = "drive.mp4";
-    const auto stream = std::make_shared<dataset::VideoStream>(
-        std::make_unique<ToldDecoder>(std::move(times_ms), turned_deg), "drive.mp4", false);
+    const auto stream = std::make_shared<dataset::VideoStream>(told_decoder(times_ms, turned_deg),
+                                                               "drive.mp4", false);
     return dataset::open_stream(stream, *read_camera_file(*request.camera_file), request);
   }
 };
 
 TEST_F(DoubtfulVideo, FramesWithoutTimesAreCounted) {
   const auto times_of = [&](const std::vector<double>& told_ms) {
-    const auto source = open(told_ms, 0.0).value();
+    const auto source = open(told_ms, 0).value();
     std::vector<double> times_s;
     for (std::size_t i = 0; i < told_ms.size(); ++i) {
       EXPECT_TRUE(source.read(i));
@@ -311,8 +301,8 @@ TEST_F(DoubtfulVideo, FramesWithoutTimesAreCounted) {
 }
 
 TEST_F(DoubtfulVideo, ATurnIsSaid) {
-  EXPECT_THAT(open({0.0}, 0.0)->warnings, IsEmpty());
-  EXPECT_THAT(open({0.0}, 180.0)->warnings, ElementsAre(HasSubstr("turned by 180 degrees")));
+  EXPECT_THAT(open({0.0}, 0)->warnings, IsEmpty());
+  EXPECT_THAT(open({0.0}, 180)->warnings, ElementsAre(HasSubstr("turned by 180 degrees")));
 }
 
 TEST_F(DoubtfulInput, TrajectoriesBetweenCommas) {

@@ -87,9 +87,9 @@ TEST_F(ImageFolderTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
   EXPECT_EQ(source.files[0], image(1));
   EXPECT_EQ(source.camera_height_m, 1.25);
   ASSERT_TRUE(source.ground_truth);
-  ASSERT_EQ(source.ground_truth->size(), 2U);
-  EXPECT_EQ(source.ground_truth->front().translation, Eigen::Vector3d::Zero());
-  EXPECT_NEAR(source.ground_truth->back().translation.z(), 2.0, 1e-12);
+  ASSERT_EQ(source.ground_truth->poses.size(), 2U);
+  EXPECT_EQ(source.ground_truth->poses.front().translation, Eigen::Vector3d::Zero());
+  EXPECT_NEAR(source.ground_truth->poses.back().translation.z(), 2.0, 1e-12);
   EXPECT_EQ(source.ground_truth_file, request_.ground_truth);
 }
 

@@ -84,7 +84,7 @@ TEST_F(KittiSequenceTest, GivenPoseFileIsTakenInsteadAndMustExist) {
   SequenceOptions options = frames(":2");
   options.ground_truth = root_ / "other.txt";
   const auto sequence = open_kitti(folder_, options);
-  EXPECT_NEAR(sequence->ground_truth->back().translation.z(), 9.0, 1e-12);
+  EXPECT_NEAR(sequence->ground_truth->poses.back().translation.z(), 9.0, 1e-12);
   options.ground_truth = root_ / "absent.txt";
   EXPECT_THAT(open_error(options), HasSubstr("absent.txt"));
 }

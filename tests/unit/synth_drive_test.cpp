@@ -51,7 +51,7 @@ TEST_F(SyntheticDriveTest, IsASequenceWithExactTruth) {
   EXPECT_EQ(sequence->camera.fx_px, sequence->camera.fy_px);
   EXPECT_DOUBLE_EQ(sequence->timestamps_s[2], 0.2);
   ASSERT_TRUE(sequence->ground_truth);
-  const Rigid3 step = sequence->ground_truth->at(1);
+  const Rigid3 step = sequence->ground_truth->poses.at(1);
   EXPECT_GT(step.translation.z(), 0.75) << "8 m/s at least, forward";
   EXPECT_LT(step.translation.norm(), 1.25) << "12 m/s at most";
   EXPECT_EQ(sequence->read(2)->type(), CV_8UC3);
@@ -93,7 +93,7 @@ TEST_F(SyntheticDriveTest, InterruptKeepsWhatIsDone) {
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(6), stop_after_two));
   const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
   EXPECT_EQ(sequence->size(), 2U);
-  EXPECT_EQ(sequence->ground_truth->size(), 2U);
+  EXPECT_EQ(sequence->ground_truth->poses.size(), 2U);
 }
 
 /// Standing, turning on the spot, and a ring driven twice over itself.
@@ -118,7 +118,7 @@ TEST_F(SyntheticDriveTest, RendersAnyGivenPoses) {
   const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
   ASSERT_EQ(sequence->size(), poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Rigid3 error = sequence->ground_truth->at(i).inverse() * poses[i];
+    const Rigid3 error = sequence->ground_truth->poses.at(i).inverse() * poses[i];
     EXPECT_LT(error.translation.norm() + error.angle_rad(), 1e-8);
     // The last numbers of the file: the road before the car, which nothing may stand on.
     const std::string depth =
