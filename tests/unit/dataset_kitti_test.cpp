@@ -67,7 +67,7 @@ TEST_F(KittiSequenceTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
   EXPECT_EQ(sequence->files[0].filename(), "000001.png");
   EXPECT_EQ(sequence->timestamps_s.front(), 0.1);
   ASSERT_TRUE(sequence->ground_truth);
-  const Trajectory& truth = *sequence->ground_truth;
+  const Trajectory& truth = sequence->ground_truth->poses;
   ASSERT_EQ(truth.size(), 2U);
   EXPECT_LT(truth[0].translation.norm() + truth[0].angle_rad(), 1e-12);
   EXPECT_LT((truth[1].translation - Eigen::Vector3d(0, 0, 2)).norm(), 1e-12);
