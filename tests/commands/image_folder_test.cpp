@@ -43,22 +43,6 @@ class ImageFolderRun : public DriveCopy {
   const std::string good_camera_ = camera_file_of(sequence_) + "rate_hz: 10\n";
 };
 
-TEST_F(ImageFolderRun, GivesTheBytesOfTheSameKittiFolder) {
-  fs::create_directories(folder_.path() / "other/00");
-  for (const char* name : {"calib.txt", "times.txt"}) {
-    fs::copy_file(sequence_ / name, folder_.path() / "other/00" / name);
-  }
-  fs::copy(images_, folder_.path() / "other/00/image_2");
-  const std::string kitti = folder_ / "kitti";
-  succeeded(run_stemvo({"run", folder_ / "other/00", "--out", kitti}));
-  write_file(folder_ / "times.txt", first_ten_lines(sequence_ / "times.txt"));
-  succeeded(run({"--set", "scale.source=camera_height", "--times", folder_ / "times.txt"}));
-  for (const char* name : {"kitti", "tum"}) {
-    const std::string file = std::string("/trajectory_") + name + ".txt";
-    EXPECT_EQ(read_file(out_ + file), read_file(kitti + file)) << file;
-  }
-}
-
 TEST_F(ImageFolderRun, NamesTheFolderAndTheCameraFile) {
   const ProgramResult result =
       run({"--gt", folder_ / "poses/00.txt", "--frames", "2:9"});  // 60 poses, 10 images

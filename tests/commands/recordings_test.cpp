@@ -46,54 +46,6 @@ class RecordingsRun : public DriveCopy {
   const std::string camera_ = folder_ / "camera.yaml";
 };
 
-TEST_F(RecordingsRun, Euroc) {
-  const fs::path mav = folder_.path() / "V1/mav0";
-  fs::create_directories(mav / "cam0/data");
-  fs::create_directories(mav / "state_groundtruth_estimate0");
-  std::string list = "#timestamp [ns],filename\n";
-  std::string truth = "#timestamp,..\n";
-  const auto true_poses = read_kitti_trajectory(folder_ / "poses/00.txt");
-  for (int i = 0; i < kNumFrames; ++i) {
-    const long time_ns = 1400000000000000000 + 100000000L * i;
-    const std::string name = fmt::format("{}.png", time_ns);
-    fs::copy_file(image(i), mav / "cam0/data" / name);
-    list += fmt::format("{},{}\n", time_ns, name);
-    const Rigid3& pose = (*true_poses)[static_cast<std::size_t>(i)];
-    const Eigen::Quaterniond q(pose.rotation);
-    if (i != 5) {  // 3 ms late, one of them missing
-      truth += fmt::format("{},{},{},{},{},{},{},{},0,0,0,0,0,0,0,0,0\n", time_ns + 3000000,
-                           pose.translation.x(), pose.translation.y(), pose.translation.z(), q.w(),
-                           q.x(), q.y(), q.z());
-    }
-  }
-  write_file(mav / "cam0/data.csv", list);
-  write_file(mav / "cam0/sensor.yaml",
-             camera_file_of(sequence_) +
-                 "rate_hz: 10\nT_BS:\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n");
-  write_file(mav / "state_groundtruth_estimate0/data.csv", truth);
-  const ProgramResult result = succeeded(run(folder_ / "V1"));
-  EXPECT_THAT(result.err, StartsWith("input: EuRoC recording V1, 12 frames of 620x188 pixels, "
-                                     "ground truth for 11 of 12 frames"));
-  EXPECT_EQ(poses(), expected_poses());
-  EXPECT_LT(metrics().at("ate_rmse_m").at("sim3").get<double>(), 0.2);
-}
-
-TEST_F(RecordingsRun, Tum) {
-  const fs::path desk = folder_.path() / "desk";
-  fs::create_directories(desk / "rgb");
-  std::string list = "# timestamp filename\n";
-  for (int i = 0; i < kNumFrames; ++i) {
-    fs::copy_file(image(i), desk / fmt::format("rgb/{}.png", i));
-    list += fmt::format("{:.2f} rgb/{}.png\n", 1305031452.79 + 0.1 * i, i);
-  }
-  write_file(desk / "rgb.txt", list);
-  write_file(desk / "camera.yaml", camera_file_of(sequence_));
-  const ProgramResult result = succeeded(run(desk.string(), {"--pictures", "6"}));
-  EXPECT_THAT(result.err, HasSubstr("input: TUM RGB-D recording desk"));
-  EXPECT_EQ(poses(), expected_poses());
-  EXPECT_THAT(read_file(out_ + "/trajectory_tum.txt"), StartsWith("1305031452.789999962 "));
-}
-
 TEST_F(RecordingsRun, AVideoWithTruthByTime) {
   std::string truth;
   const auto true_poses = read_kitti_trajectory(folder_ / "poses/00.txt");

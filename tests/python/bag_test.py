@@ -5,22 +5,16 @@ import contextlib
 import io
 import json
 import os
-import pathlib
 import subprocess
-import sys
 import types
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "python/stemvo"))  # the file alone: it needs no built module
-
-import bag as bag_module  # noqa: E402
-import numpy as np  # noqa: E402
-import PIL.Image  # noqa: E402
-import pytest  # noqa: E402
-import rosbags.highlevel  # noqa: E402
-import rosbags.rosbag1  # noqa: E402
-import rosbags.rosbag2  # noqa: E402
-from rosbags.typesys import Stores, get_typestore  # noqa: E402
+import bags
+import numpy as np
+import PIL.Image
+import pytest
+import rosbags.highlevel
+from bags import ROOT, bag_module
+from rosbags.typesys import Stores, get_typestore
 
 PROGRAM = os.environ.get("STEMVO_PROGRAM", str(ROOT / "build/release/stemvo"))
 FIRST_NS = 1_700_000_000_123_456_789
@@ -40,55 +34,11 @@ class TestBag:
         self.folder = tmp_path
         self.out = self.folder / "out"
 
-    def write(self, kind, encoding="rgb8", topic="/cam0/image_raw", stamps=None, info=True, model="plumb_bob", **said):
-        """A bag of the scene; `encoding` may be jpeg; `said` goes before what camera_info says."""
-        is_ros1 = kind == "bag"
-        store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE)
-        file = self.folder / ("made.bag" if is_ros1 else "made_" + kind)
-        if is_ros1:
-            writer = rosbags.rosbag1.Writer(file)
-        else:
-            writer = rosbags.rosbag2.Writer(file, version=9, storage_plugin=getattr(rosbags.rosbag2.StoragePlugin, kind.upper()))
-        types = store.types
-        image_type = "sensor_msgs/msg/CompressedImage" if encoding == "jpeg" else "sensor_msgs/msg/Image"
-
-        def header(time_ns):
-            stamp = types["builtin_interfaces/msg/Time"](sec=time_ns // 10**9, nanosec=time_ns % 10**9)
-            return types["std_msgs/msg/Header"](**({"seq": 0} if is_ros1 else {}), stamp=stamp, frame_id="cam")
-
-        def put(connection, time_ns, message, name):
-            raw = store.serialize_ros1(message, name) if is_ros1 else store.serialize_cdr(message, name)
-            writer.write(connection, time_ns, raw)
-
-        with writer:
-            images = writer.add_connection(topic, image_type, typestore=store)
-            if info:
-                region = types["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
-                matrices = {"d": np.array([-0.1, 0.02, 0.0, 0.0, 0.0]), "k": np.array([150.0, 0, 79.5, 0, 151.0, 59.5, 0, 0, 1]), "r": np.eye(3).ravel(), "p": np.zeros(12),
-                            "binning_x": 0, "binning_y": 0, "roi": region, **said}
-                message = types["sensor_msgs/msg/CameraInfo"](header=header(FIRST_NS), height=HEIGHT, width=WIDTH, distortion_model=model,
-                                                             **{(key.upper() if is_ros1 and len(key) == 1 else key): value for key, value in matrices.items()})
-                connection = writer.add_connection("/cam0/camera_info", "sensor_msgs/msg/CameraInfo", typestore=store)
-                put(connection, FIRST_NS, message, "sensor_msgs/msg/CameraInfo")
-            for index in range(COUNT):
-                time_ns = FIRST_NS + (stamps[index] if stamps else index * 10**8)
-                pixels = scene(index)
-                if encoding == "jpeg":
-                    data = io.BytesIO()
-                    PIL.Image.fromarray(pixels).save(data, "jpeg", quality=95)
-                    message = types[image_type](header=header(time_ns), format="rgb8; jpeg compressed bgr8", data=np.frombuffer(data.getvalue(), np.uint8))
-                else:
-                    samples = {"rgb8": pixels, "bgr8": pixels[:, :, ::-1], "mono8": pixels[:, :, 1], "mono16": pixels[:, :, 1].astype("<u2") * 256 + 7}.get(encoding, pixels)
-                    rows = np.ascontiguousarray(samples).reshape(HEIGHT, -1).view(np.uint8)
-                    padded = np.pad(rows, ((0, 0), (0, 6)))  # drivers align rows
-                    message = types[image_type](header=header(time_ns), height=HEIGHT, width=WIDTH, encoding=encoding, is_bigendian=0, step=padded.shape[1], data=padded.ravel())
-                put(images, FIRST_NS + index * 10**8, message, image_type)
-        return file
-
-    def convert(self, *arguments):
-        with contextlib.redirect_stdout(io.StringIO()) as said, contextlib.redirect_stderr(io.StringIO()) as complaints:
-            code = bag_module.main([str(argument) for argument in arguments])
-        return code, said.getvalue(), complaints.getvalue()
+    def write(self, kind, encoding="rgb8", stamps=None, **more):
+        stamps = stamps or [index * 10**8 for index in range(COUNT)]
+        return bags.write(self.folder / ("made.bag" if kind == "bag" else "made_" + kind), kind, [scene(index) for index in range(COUNT)],
+                          [FIRST_NS + stamp for stamp in stamps], [150.0, 0, 79.5, 0, 151.0, 59.5, 0, 0, 1], encoding,
+                          **{"d": np.array([-0.1, 0.02, 0.0, 0.0, 0.0]), **more})
 
     def images(self):
         lines = (self.out / "mav0/cam0/data.csv").read_text(encoding="utf-8").splitlines()
@@ -97,30 +47,30 @@ class TestBag:
         return [(int(time), np.asarray(PIL.Image.open(self.out / "mav0/cam0/data" / name))) for time, name in rows]
 
     def expect_error(self, words, *arguments):
-        code, said, complaint = self.convert(*arguments)
+        code, said, complaint = bags.convert(*arguments)
         assert (code, said, complaint.count("\n")) == (1, "", 1), complaint
         assert all(word in complaint for word in ("error: ", *words)), complaint
         assert not list(self.folder.glob("*.unfinished"))
 
     @pytest.mark.parametrize(("kind", "encoding"), [("bag", "bgr8"), ("bag", "mono8"), ("sqlite3", "rgb8"), ("mcap", "mono16"), ("mcap", "rgb8")])
     def test_every_kind_of_bag_gives_the_pixels_and_times(self, kind, encoding):
-        code, _, complaint = self.convert(self.write(kind, encoding), self.out)
+        code, _, complaint = bags.convert(self.write(kind, encoding), self.out)
         assert code == 0, complaint
         found = self.images()
         assert [time for time, _ in found] == [FIRST_NS + index * 10**8 for index in range(COUNT)]
         for index, (_, pixels) in enumerate(found):
             expected = scene(index)[:, :, 1] if encoding.startswith("mono") else scene(index)
             if encoding == "mono16":
-                expected = expected.astype(np.uint16) * 256 + 7
+                expected = expected.astype(np.uint16) * 257
             np.testing.assert_array_equal(pixels, expected)
 
     def test_a_lone_mcap_file_and_jpegs_as_they_are(self):
-        file = next(self.write("mcap", "jpeg", "/cam0/image_raw/compressed").glob("*.mcap"))
-        assert self.convert(file, self.out)[0] == 0 and len(list((self.out / "mav0/cam0/data").glob("*.jpg"))) == COUNT
+        file = next(self.write("mcap", "jpeg", topic="/cam0/image_raw/compressed").glob("*.mcap"))
+        assert bags.convert(file, self.out)[0] == 0 and len(list((self.out / "mav0/cam0/data").glob("*.jpg"))) == COUNT
         assert np.abs(self.images()[2][1].astype(int) - scene(2)).mean() < 20
 
     def test_stemvo_runs_on_it(self):
-        assert self.convert(self.write("sqlite3"), self.out)[0] == 0
+        assert bags.convert(self.write("sqlite3"), self.out)[0] == 0
         done = subprocess.run([PROGRAM, "run", self.out, "--out", self.folder / "result"], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         assert "input: EuRoC recording out, 5 frames of 160x120 pixels" in done.stderr
@@ -128,7 +78,7 @@ class TestBag:
         assert float(first) == pytest.approx(FIRST_NS * 1e-9, abs=0.5e-5, rel=0)
 
     def test_late_images_are_left_out(self):
-        code, said, _ = self.convert(self.write("bag", stamps=[0, 10, 10, 5, 20]), self.out)
+        code, said, _ = bags.convert(self.write("bag", stamps=[0, 10, 10, 5, 20]), self.out)
         assert code == 0 and "3 images; 2 of no later time" in said and [time - FIRST_NS for time, _ in self.images()] == [0, 10, 20]
 
     def test_the_camera_comes_from_a_file_where_the_bag_has_none(self):
@@ -136,7 +86,7 @@ class TestBag:
         self.expect_error(["/cam0/camera_info", "--camera FILE"], bag, self.out)
         camera = self.folder / "camera.yaml"
         camera.write_text("resolution: [160, 120]\nintrinsics: [150, 150, 79.5, 59.5]\ndistortion_model: none\n", encoding="utf-8")
-        assert self.convert(bag, self.out, "--camera", camera)[0] == 0
+        assert bags.convert(bag, self.out, "--camera", camera)[0] == 0
         assert (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8") == camera.read_text(encoding="utf-8")
 
     def test_the_camera_of_a_chain_is_that_of_the_topic(self):
@@ -144,7 +94,7 @@ class TestBag:
         chain = self.folder / "camchain.yaml"
         camera = "cam{0}:\n  intrinsics: [15{0}, 150, 79.5, 59.5]\n  distortion_model: radtan\n  distortion_coeffs: [0, 0, 0, 0]\n  resolution: [160, 120]\n  rostopic: {1}\n"
         chain.write_text(camera.format(0, "/cam0/image_raw") + camera.format(1, "/cam1/image_raw"), encoding="utf-8")
-        assert self.convert(bag, self.out, "--camera", chain)[0] == 0
+        assert bags.convert(bag, self.out, "--camera", chain)[0] == 0
         assert (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8") == camera.format(1, "/cam1/image_raw").replace("cam1:", "cam0:", 1)
         chain.write_text(camera.format(0, "/left") + camera.format(1, "/right"), encoding="utf-8")
         other = self.folder / "other"
@@ -160,14 +110,14 @@ class TestBag:
     @pytest.mark.parametrize(("kind", "encoding", "topic"), [("bag", "rgb8", "/cam0/image_rect"), ("bag", "rgb8", "/cam0/image_undistorted"), ("sqlite3", "rgb8", "/cam0/image_rect_color"), ("mcap", "jpeg", "/cam0/image_rect/compressed")])
     def test_a_rectified_topic_has_the_camera_of_p(self, kind, encoding, topic):
         projection = np.array([140.0, 0, 80.5, 0, 0, 141.0, 60.5, 0, 0, 0, 1, 0])
-        code, _, told = self.convert(self.write(kind, encoding, topic, p=projection), self.out)
+        code, _, told = bags.convert(self.write(kind, encoding, topic=topic, p=projection), self.out)
         assert code == 0, told
         assert "P without distortion" in told
         text = (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8")
         assert "intrinsics: [140.0, 141.0, 80.5, 60.5]\ndistortion_model: none\n" in text
 
     def test_a_topic_that_may_be_rectified_is_a_warning(self):
-        code, _, told = self.convert(self.write("bag", topic="/cam0/direct", p=np.array([140.0, 0, 80.5, 0, 0, 141.0, 60.5, 0, 0, 0, 1, 0])), self.out)
+        code, _, told = bags.convert(self.write("bag", topic="/cam0/direct", p=np.array([140.0, 0, 80.5, 0, 0, 141.0, 60.5, 0, 0, 0, 1, 0])), self.out)
         assert code == 0, told
         assert "warning: /cam0/camera_info: K and D" in told
         assert "intrinsics: [150.0, 151.0, 79.5, 59.5]\ndistortion_model: radial-tangential" in (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8")
