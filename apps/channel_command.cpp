@@ -8,6 +8,7 @@
 #include "console.hpp"
 #include "options.hpp"
 #include "pipeline/channel_images.hpp"
+#include "progress.hpp"
 #include "try.hpp"
 
 namespace stemvo::apps {

@@ -16,6 +16,7 @@
 #include "commands.hpp"
 #include "config/config.hpp"
 #include "console.hpp"
+#include "progress.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
 

@@ -17,7 +17,6 @@
 #include "frames.hpp"
 #include "odometry/channel_odometry.hpp"
 #include "options.hpp"
-#include "stem/hand_made.hpp"
 #include "stem/model.hpp"
 #include "stem/stem.hpp"
 

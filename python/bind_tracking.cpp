@@ -9,8 +9,9 @@
 #include <nanobind/stl/shared_ptr.h>
 
 #include "arrays.hpp"
-#include "features/grid_quota.hpp"
-#include "features/patch_front_end.hpp"
+#include "features/front_end.hpp"
+#include "features/patch_alignment.hpp"
+#include "features/point_front_end.hpp"
 #include "options.hpp"
 #include "stem/stem.hpp"
 
@@ -45,7 +46,7 @@ class PatchTracker {
         resolution_(config.stem.tracking_resolution),
         stem_(value_or_raise(Stem::load(config.stem))),
         contrast_(config.stem),
-        front_end_(std::make_unique<PatchFrontEnd>(config.features)) {
+        front_end_(create_patch_front_end(config.features)) {
     if (resolution_ == TrackingResolution::kAuto) {
       throw nb::value_error("stem.tracking_resolution: expected no auto (no camera is known)");
     }

@@ -5,14 +5,13 @@
 #include <string_view>
 
 // Code that is compiled once for every processor and once for those with AVX2 and FMA: the body is
-// STEMVO_INLINE, and called from a plain function and from one that is STEMVO_AVX2.
+// STEMVO_INLINE, and called from portable_copy() and from avx2_copy().
 
 #define STEMVO_INLINE inline __attribute__((always_inline))
 
 #if defined(__x86_64__)
-#define STEMVO_AVX2 __attribute__((target("avx2,fma")))
 /// A processor that has both counts bits, too.
-#define STEMVO_POPCNT __attribute__((target("avx2,fma,popcnt")))
+#define STEMVO_AVX2 __attribute__((target("avx2,fma,popcnt")))
 #endif
 
 namespace stemvo {
@@ -33,6 +32,29 @@ namespace stemvo {
 #else
   return false;
 #endif
+}
+
+/// A body as it is compiled for every processor.
+template <auto kBody, typename... Arguments>
+void portable_copy(Arguments... arguments) {
+  kBody(arguments...);
+}
+#if defined(__x86_64__)
+template <auto kBody, typename... Arguments>
+STEMVO_AVX2 void avx2_copy(Arguments... arguments) {
+  kBody(arguments...);
+}
+#endif
+
+/// Calls a body as it is compiled for this process.
+template <auto kBody, typename... Arguments>
+void run_body(Arguments&... arguments) {
+#if defined(__x86_64__)
+  if (uses_avx2()) {
+    return avx2_copy<kBody, Arguments&...>(arguments...);
+  }
+#endif
+  portable_copy<kBody, Arguments&...>(arguments...);
 }
 
 }  // namespace stemvo

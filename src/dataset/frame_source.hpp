@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 
 #include "config/config.hpp"
+#include "evaluation/pose_file.hpp"
 #include "evaluation/trajectory.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "evaluation/trajectory.hpp"
+#include "evaluation/pose_file.hpp"
 #include "geometry/degrees.hpp"
 #include "internal_check.hpp"
 

@@ -7,7 +7,6 @@
 #include <opencv2/features2d.hpp>
 
 #include "features/front_end.hpp"
-#include "features/grid_quota.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -72,7 +71,6 @@ class DescriptorFrontEnd final : public FrontEnd {
                                 const ImageClue& clue) override {
     auto current = std::static_pointer_cast<const Described>(std::move(prepared));
     Matches matches;
-    matches.num_keypoints = static_cast<int>(current->uv.size());
     std::vector<int> track_ids(current->uv.size(), -1);
     matched_.clear();
     if (last_ != nullptr && last_->channel.pixels.size() == current->channel.pixels.size()) {

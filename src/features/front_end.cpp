@@ -3,8 +3,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "features/patch_front_end.hpp"
-
 namespace stemvo {
 
 cv::Mat ImagePyramid::mask_of(const PixelMap& map, cv::Size size) const {
@@ -18,16 +16,9 @@ cv::Mat ImagePyramid::mask_of(const PixelMap& map, cv::Size size) const {
   return result;
 }
 
-cv::Mat FrontEnd::with_mask(const cv::Mat& mask) const {
-  if (mask_.empty() || mask.empty()) {
-    return mask.empty() ? mask_ : mask;
-  }
-  return (mask_ != 0) & (mask != 0);
-}
-
 std::unique_ptr<FrontEnd> create_front_end(const FeatureOptions& options) {
   if (options.method == FeatureMethod::kPatch) {
-    return std::make_unique<PatchFrontEnd>(options);
+    return create_patch_front_end(options);
   }
   if (options.method == FeatureMethod::kKlt) {
     return create_klt_front_end(options);

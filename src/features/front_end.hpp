@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Core>
+#include <opencv2/core.hpp>
 
 #include "stem/channel.hpp"
 #include "stemvo/options.hpp"
@@ -27,7 +30,6 @@ struct Matches {
   std::vector<Eigen::Vector2d> cur_uv;
   std::vector<int> track_ids;  ///< the same id while a point is followed
   int prev_frame = -1;         ///< the number of the frame that prev_uv is on; -1: none
-  int num_keypoints = 0;       ///< found or asked for, before matching
 };
 
 /// An image as a front end prepares it, without those before it; each derives what it adds.
@@ -79,7 +81,12 @@ class FrontEnd {
 
  protected:
   /// Both masks.
-  [[nodiscard]] cv::Mat with_mask(const cv::Mat& mask) const;
+  [[nodiscard]] cv::Mat with_mask(const cv::Mat& mask) const {
+    if (mask_.empty() || mask.empty()) {
+      return mask.empty() ? mask_ : mask;
+    }
+    return (mask_ != 0) & (mask != 0);
+  }
 
  private:
   cv::Mat mask_;
@@ -87,7 +94,42 @@ class FrontEnd {
 
 [[nodiscard]] std::unique_ptr<FrontEnd> create_front_end(const FeatureOptions& options);
 /// One kind, for create_front_end().
+[[nodiscard]] std::unique_ptr<FrontEnd> create_patch_front_end(const FeatureOptions& options);
 [[nodiscard]] std::unique_ptr<FrontEnd> create_klt_front_end(const FeatureOptions& options);
 [[nodiscard]] std::unique_ptr<FrontEnd> create_descriptor_front_end(const FeatureOptions& options);
+
+/// Counts keypoints per cell of an image, so that no part of it takes all of them.
+class GridQuota {
+ public:
+  /// Quota per cell = max_features / cells, at least 1.
+  GridQuota(const FeatureOptions& options, cv::Size image_size)
+      : columns_(options.grid_columns),
+        rows_(options.grid_rows),
+        quota_(std::max(1, options.max_features / (columns_ * rows_))),
+        size_(image_size),
+        counts_(static_cast<std::size_t>(columns_ * rows_), 0) {}
+
+  /// Takes a place in the point's cell; false when the cell is full.
+  bool take(const cv::Point2f& image_uv) {
+    const auto cell = [](float position, int extent, int num_cells) {
+      const int index =
+          static_cast<int>(position * static_cast<float>(num_cells) / static_cast<float>(extent));
+      return std::clamp(index, 0, num_cells - 1);
+    };
+    const int column = cell(image_uv.x, size_.width, columns_);
+    const int row = cell(image_uv.y, size_.height, rows_);
+    int& count = counts_[static_cast<std::size_t>(row * columns_ + column)];
+    const bool has_room = count < quota_;
+    count += has_room ? 1 : 0;
+    return has_room;
+  }
+
+ private:
+  int columns_;
+  int rows_;
+  int quota_;
+  cv::Size size_;
+  std::vector<int> counts_;
+};
 
 }  // namespace stemvo

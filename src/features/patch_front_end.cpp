@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: MIT
-#include "features/patch_front_end.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <map>
+#include <memory>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
+#include "features/patch_alignment.hpp"
+#include "features/point_front_end.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -43,7 +47,36 @@ class Motions {
   [[nodiscard]] bool empty() const { return known_.empty(); }
   void add(const cv::Point2f& from, const cv::Point2f& motion) { known_.push_back({from, motion}); }
   /// Median of the nearest; none: 0.
-  [[nodiscard]] cv::Point2f near(const cv::Point2f& uv) const;
+  [[nodiscard]] cv::Point2f near(const cv::Point2f& uv) const {
+    struct Near {
+      float distance_sq = std::numeric_limits<float>::infinity();
+      cv::Point2f motion;
+    };
+    std::array<Near, kNumNeighbours> nearest;  // the nearest first
+    for (const Known& known : known_) {
+      const cv::Point2f to = known.from - uv;
+      const float distance_sq = to.dot(to);
+      if (distance_sq < nearest.back().distance_sq) {
+        std::size_t i = kNumNeighbours - 1;
+        for (; i > 0 && distance_sq < nearest[i - 1].distance_sq; --i) {
+          nearest[i] = nearest[i - 1];
+        }
+        nearest[i] = {distance_sq, known.motion};
+      }
+    }
+    const std::size_t count = std::min(kNumNeighbours, known_.size());
+    if (count == 0) {
+      return {};
+    }
+    const auto median = [&](float cv::Point2f::* axis) {
+      const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(count / 2);
+      std::nth_element(
+          nearest.begin(), middle, nearest.begin() + static_cast<std::ptrdiff_t>(count),
+          [&](const Near& a, const Near& b) { return a.motion.*axis < b.motion.*axis; });
+      return middle->motion.*axis;
+    };
+    return {median(&cv::Point2f::x), median(&cv::Point2f::y)};
+  }
 
  private:
   struct Known {
@@ -52,36 +85,6 @@ class Motions {
   };
   std::vector<Known> known_;
 };
-
-cv::Point2f Motions::near(const cv::Point2f& uv) const {
-  struct Near {
-    float distance_sq = std::numeric_limits<float>::infinity();
-    cv::Point2f motion;
-  };
-  std::array<Near, kNumNeighbours> nearest;  // the nearest first
-  for (const Known& known : known_) {
-    const cv::Point2f to = known.from - uv;
-    const float distance_sq = to.dot(to);
-    if (distance_sq < nearest.back().distance_sq) {
-      std::size_t i = kNumNeighbours - 1;
-      for (; i > 0 && distance_sq < nearest[i - 1].distance_sq; --i) {
-        nearest[i] = nearest[i - 1];
-      }
-      nearest[i] = {distance_sq, known.motion};
-    }
-  }
-  const std::size_t count = std::min(kNumNeighbours, known_.size());
-  if (count == 0) {
-    return {};
-  }
-  const auto median = [&](float cv::Point2f::* axis) {
-    const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(nearest.begin(), middle, nearest.begin() + static_cast<std::ptrdiff_t>(count),
-                     [&](const Near& a, const Near& b) { return a.motion.*axis < b.motion.*axis; });
-    return middle->motion.*axis;
-  };
-  return {median(&cv::Point2f::x), median(&cv::Point2f::y)};
-}
 
 /// How far a turn, as ImageClue::turn, moves a pixel that shows what is far away.
 cv::Point2f shift_of(const Eigen::Matrix3d& turn, const PixelMap& map, const cv::Point2f& uv) {
@@ -94,236 +97,259 @@ cv::Point2f shift_of(const Eigen::Matrix3d& turn, const PixelMap& map, const cv:
   return cv::Point2f(static_cast<float>(there.x()), static_cast<float>(there.y())) - uv;
 }
 
-}  // namespace
-
-/// The motions that are expected of points between two images.
-class PatchFrontEnd::Outlook {
+/// Tracks by aligning the patch cut out when a point was new. A patch that has changed too much is
+/// cut out anew where the point is; the track keeps its id.
+class PatchFrontEnd final : public PointFrontEnd {
  public:
-  Outlook(const View& from, const View& to)
-      : from_(from),
-        ratio_(from.interval_s > 0.0
-                   ? static_cast<float>((to.time_s - from.time_s) / from.interval_s)
-                   : 1.0F) {}
+  using PointFrontEnd::PointFrontEnd;
 
-  /// The motion of a point that came by `motion`, at the same speed.
-  [[nodiscard]] cv::Point2f on(const cv::Point2f& motion) const { return ratio_ * motion; }
-  [[nodiscard]] bool knows_turn() const { return from_.turn_to_newest.has_value(); }
-  /// By the turn alone.
-  [[nodiscard]] cv::Point2f turned(const cv::Point2f& uv) const {
-    return shift_of(*from_.turn_to_newest, from_.image->channel.map, uv);
-  }
-  /// By the turn, and at the same speed what an earlier turn leaves of `motion`.
-  [[nodiscard]] cv::Point2f turned(const cv::Point2f& uv, const cv::Point2f& motion) const {
-    const PixelMap& map = from_.image->channel.map;
-    return turned(uv) + (from_.turn.has_value()
-                             ? on(motion - shift_of(*from_.turn, map, uv - motion))
-                             : cv::Point2f());
+  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(const ChannelImage& channel,
+                                                            const cv::Mat& mask) const override {
+    const StageTimer timer(Stage::kPyramid);
+    auto image = std::make_shared<PatchPyramid>(channel);
+    image->mask = with_mask(mask);
+    image->levels.clear();
+    cv::Mat level = channel.pixels;
+    const int num = num_levels(channel.map.scale.minCoeff()) + 1;  // the last for large motions
+    for (int i = 0; i < num; ++i) {
+      if (i > 0) {
+        cv::Mat half;
+        cv::pyrDown(level, half);
+        level = half;
+      }
+      constexpr int kBorder = kPatchBorder_px;
+      cv::Mat bordered;
+      cv::copyMakeBorder(level, bordered, kBorder, kBorder, kBorder, kBorder,
+                         cv::BORDER_REFLECT_101);
+      level = bordered(cv::Rect(kBorder, kBorder, level.cols, level.rows));
+      image->levels.push_back(level);
+      image->bordered.push_back(
+          {level.data, static_cast<std::ptrdiff_t>(level.step), level.cols, level.rows});
+    }
+    return image;
   }
 
  private:
-  const View& from_;
-  float ratio_;  ///< of the interval to the one before
+  struct PatchPyramid : ImagePyramid {
+    using ImagePyramid::ImagePyramid;
+    std::vector<BorderedImage> bordered;  ///< the levels, each in the middle of a larger image
+  };
+  /// The motions that are expected of points between two images.
+  class Outlook {
+   public:
+    Outlook(const View& from, const View& to)
+        : from_(from),
+          ratio_(from.interval_s > 0.0
+                     ? static_cast<float>((to.time_s - from.time_s) / from.interval_s)
+                     : 1.0F) {}
+
+    /// The motion of a point that came by `motion`, at the same speed.
+    [[nodiscard]] cv::Point2f on(const cv::Point2f& motion) const { return ratio_ * motion; }
+    [[nodiscard]] bool knows_turn() const { return from_.turn_to_newest.has_value(); }
+    /// By the turn alone.
+    [[nodiscard]] cv::Point2f turned(const cv::Point2f& uv) const {
+      return shift_of(*from_.turn_to_newest, from_.image->channel.map, uv);
+    }
+    /// By the turn, and at the same speed what an earlier turn leaves of `motion`.
+    [[nodiscard]] cv::Point2f turned(const cv::Point2f& uv, const cv::Point2f& motion) const {
+      const PixelMap& map = from_.image->channel.map;
+      return turned(uv) + (from_.turn.has_value()
+                               ? on(motion - shift_of(*from_.turn, map, uv - motion))
+                               : cv::Point2f());
+    }
+
+   private:
+    const View& from_;
+    float ratio_;  ///< of the interval to the one before
+  };
+
+  struct Track {
+    Patch patch;
+    Similarity warp;     ///< from the patch to the last image it was found in
+    cv::Point2f motion;  ///< to there, from the image before
+    int frame = -1;      ///< the number of that image; -1: it is new
+  };
+
+  [[nodiscard]] bool begin_track(const ImagePyramid& image, const Point& point) override {
+    Track track;
+    track.warp = {point.uv.x, point.uv.y};
+    const Pyramid pyramid = static_cast<const PatchPyramid&>(image).bordered;
+    if (!cut_patch(pyramid, point.uv.x, point.uv.y, track.patch)) {
+      return false;
+    }
+    if (ended_.empty()) {
+      return tracks_.emplace(point.id, track).second;
+    }
+    auto node = std::move(ended_.back());
+    ended_.pop_back();
+    node.key() = point.id;
+    node.mapped() = track;
+    return tracks_.insert(std::move(node)).inserted;
+  }
+
+  [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
+                                                                     View& to) override {
+    const auto& image = static_cast<const PatchPyramid&>(*to.image);
+    const Pyramid pyramid = image.bordered;
+    const int coarsest = static_cast<int>(pyramid.size()) - 1;
+    const int top = coarsest - 1;
+    const int predicted = std::min(kPredictedLevel, top);
+    Motions motions(from.points.size());
+    const auto align = [&](const Point& point, const cv::Point2f& motion, int first_level) {
+      const Track& track = tracks_.at(point.id);
+      const cv::Point2f start = point.uv + motion;
+      return align_patch(track.patch, pyramid, {start.x, start.y, track.warp.a, track.warp.b},
+                         first_level);
+    };
+    const Outlook outlook(from, to);
+    const bool is_turned = outlook.knows_turn() && leads_to_points(outlook, from, align, top);
+    if (is_turned) {
+      to.turn = from.turn_to_newest;
+    }
+    const auto near = [&](const cv::Point2f& uv) {
+      return motions.empty() && is_turned ? outlook.turned(uv) : motions.near(uv);
+    };
+    // First the points that were tracked to here: they tell the others where to look.
+    std::vector<PatchMatch> found(from.points.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const Point& point = from.points[i];
+      const Track& track = tracks_.at(point.id);
+      if (track.frame == from.frame) {
+        found[i] = align(
+            point, is_turned ? outlook.turned(point.uv, track.motion) : outlook.on(track.motion),
+            predicted);
+        if (found[i].correlation >= kMinCorrelation) {
+          motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
+        }
+      }
+    }
+    std::vector<std::optional<cv::Point2f>> result(found.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const Point& point = from.points[i];
+      const Track& track = tracks_.at(point.id);
+      if (found[i].correlation < kMinCorrelation) {
+        const cv::Point2f motion = near(point.uv);
+        const bool is_predicted = track.frame != from.frame && !motions.empty();
+        found[i] = align(point, motion, is_predicted ? predicted : top);
+        if (found[i].correlation < kMinCorrelation && is_predicted) {
+          found[i] = align(point, motion, top);
+        }
+      }
+    }
+    const auto is_found = [](const PatchMatch& one) { return one.correlation >= kMinCorrelation; };
+    const auto num_found = static_cast<double>(std::ranges::count_if(found, is_found));
+    const bool is_far =
+        top < Patch::kNumCoarse && num_found < kFewFound * static_cast<double>(found.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const Point& point = from.points[i];
+      Track& track = tracks_.at(point.id);
+      if (is_far && !is_found(found[i])) {
+        found[i] = align(point, near(point.uv), coarsest);
+        if (is_found(found[i])) {
+          motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
+        }
+      }
+      if (accept(found[i], image, to.frame, point, track)) {
+        result[i] = cv::Point2f(track.warp.x, track.warp.y);
+      }
+    }
+    return result;
+  }
+
+  /// A hint may be wrong: it counts where it leads to points, and to as many as no hint does.
+  /// Patches are found in wrong places, too, now and then: few points say nothing.
+  template <typename Align>
+  [[nodiscard]] bool leads_to_points(const Outlook& outlook,
+                                     const View& from,
+                                     const Align& align,
+                                     int top) const {
+    int num_probes = 0;
+    int num_with = 0;
+    int num_without = 0;
+    const std::size_t step = std::max<std::size_t>(1, from.points.size() / kNumProbes);
+    for (std::size_t i = 0; i < from.points.size(); i += step) {
+      const Point& point = from.points[i];
+      const Track& track = tracks_.at(point.id);
+      const bool knows_motion = track.frame == from.frame;
+      const int level = knows_motion ? std::min(kPredictedLevel, top) : top;
+      const cv::Point2f with =
+          knows_motion ? outlook.turned(point.uv, track.motion) : outlook.turned(point.uv);
+      const cv::Point2f without = knows_motion ? outlook.on(track.motion) : cv::Point2f();
+      if (const cv::Point2f off = with - without; off.dot(off) > kSameStart_px * kSameStart_px) {
+        ++num_probes;
+        num_with += align(point, with, level).correlation >= kMinCorrelation ? 1 : 0;
+        num_without += align(point, without, level).correlation >= kMinCorrelation ? 1 : 0;
+      }
+    }
+    return num_with >= std::max<double>(num_without, kFewFound * num_probes);
+  }
+
+  [[nodiscard]] std::optional<cv::Point2f> match_projection(const ImagePyramid& image,
+                                                            const Point& point) override {
+    const auto known = tracks_.find(point.id);
+    if (known == tracks_.end()) {
+      return std::nullopt;
+    }
+    Track& track = known->second;
+    const PatchMatch found =
+        align_patch(track.patch, static_cast<const PatchPyramid&>(image).bordered,
+                    {point.uv.x, point.uv.y, track.warp.a, track.warp.b}, kPredictedLevel);
+    const cv::Point2f uv(found.warp.x, found.warp.y);
+    const cv::Point2f off = uv - point.uv;
+    if (found.correlation < kMinAgain || off.dot(off) > kMaxOff_px * kMaxOff_px) {
+      ended_.push_back(tracks_.extract(known));
+      return std::nullopt;
+    }
+    track.warp = found.warp;
+    return uv;
+  }
+
+  void end_other_tracks(const std::vector<Point>& last,
+                        const std::vector<Point>& good,
+                        const Observations& expected) override {
+    const auto has = [](const auto& points, auto id_of, int id) {
+      const auto found = std::ranges::lower_bound(points, id, {}, id_of);
+      return found != points.end() && std::invoke(id_of, *found) == id;
+    };
+    for (auto track = tracks_.begin(); track != tracks_.end();) {
+      const int id = track->first;
+      const bool goes_on = has(last, &Point::id, id) || has(good, &Point::id, id) ||
+                           has(expected, &Observation::track_id, id);
+      const auto current = track++;
+      if (!goes_on) {
+        ended_.push_back(tracks_.extract(current));
+      }
+    }
+  }
+
+  [[nodiscard]] static bool accept(const PatchMatch& found,
+                                   const PatchPyramid& image,
+                                   int frame,
+                                   const Point& from,
+                                   Track& track) {
+    if (found.correlation < kMinCorrelation) {
+      return false;
+    }
+    track.warp = found.warp;
+    track.motion = cv::Point2f(found.warp.x, found.warp.y) - from.uv;
+    track.frame = frame;
+    const float scale_sq = found.warp.a * found.warp.a + found.warp.b * found.warp.b;
+    constexpr float kMaxSq = kMaxScale * kMaxScale;
+    if (found.correlation >= kGoodCorrelation && scale_sq < kMaxSq && scale_sq * kMaxSq > 1.0F) {
+      return true;
+    }
+    track.warp = {found.warp.x, found.warp.y};
+    return cut_patch(image.bordered, found.warp.x, found.warp.y, track.patch);
+  }
+
+  std::map<int, Track> tracks_;                         ///< by id
+  std::vector<std::map<int, Track>::node_type> ended_;  ///< their memory is that of new ones
 };
 
-struct PatchFrontEnd::PatchPyramid : ImagePyramid {
-  using ImagePyramid::ImagePyramid;
-  std::vector<BorderedImage> bordered;  ///< the levels, each in the middle of a larger image
-};
+}  // namespace
 
-std::shared_ptr<const ImagePyramid> PatchFrontEnd::prepare(const ChannelImage& channel,
-                                                           const cv::Mat& mask) const {
-  const StageTimer timer(Stage::kPyramid);
-  auto image = std::make_shared<PatchPyramid>(channel);
-  image->mask = with_mask(mask);
-  image->levels.clear();
-  cv::Mat level = channel.pixels;
-  const int num = num_levels(channel.map.scale.minCoeff()) + 1;  // the last for large motions
-  for (int i = 0; i < num; ++i) {
-    if (i > 0) {
-      cv::Mat half;
-      cv::pyrDown(level, half);
-      level = half;
-    }
-    constexpr int kBorder = kPatchBorder_px;
-    cv::Mat bordered;
-    cv::copyMakeBorder(level, bordered, kBorder, kBorder, kBorder, kBorder, cv::BORDER_REFLECT_101);
-    level = bordered(cv::Rect(kBorder, kBorder, level.cols, level.rows));
-    image->levels.push_back(level);
-    image->bordered.push_back(
-        {level.data, static_cast<std::ptrdiff_t>(level.step), level.cols, level.rows});
-  }
-  return image;
-}
-
-bool PatchFrontEnd::begin_track(const ImagePyramid& image, const Point& point) {
-  Track track;
-  track.warp = {point.uv.x, point.uv.y};
-  const Pyramid pyramid = static_cast<const PatchPyramid&>(image).bordered;
-  if (!cut_patch(pyramid, point.uv.x, point.uv.y, track.patch)) {
-    return false;
-  }
-  if (ended_.empty()) {
-    return tracks_.emplace(point.id, track).second;
-  }
-  auto node = std::move(ended_.back());
-  ended_.pop_back();
-  node.key() = point.id;
-  node.mapped() = track;
-  return tracks_.insert(std::move(node)).inserted;
-}
-
-/// A hint may be wrong: it counts where it leads to points, and to as many as no hint does. Patches
-/// are found in wrong places, too, now and then: few points say nothing.
-template <typename Align>
-bool PatchFrontEnd::leads_to_points(const Outlook& outlook,
-                                    const View& from,
-                                    const Align& align,
-                                    int top) const {
-  int num_probes = 0;
-  int num_with = 0;
-  int num_without = 0;
-  const std::size_t step = std::max<std::size_t>(1, from.points.size() / kNumProbes);
-  for (std::size_t i = 0; i < from.points.size(); i += step) {
-    const Point& point = from.points[i];
-    const Track& track = tracks_.at(point.id);
-    const bool knows_motion = track.frame == from.frame;
-    const int level = knows_motion ? std::min(kPredictedLevel, top) : top;
-    const cv::Point2f with =
-        knows_motion ? outlook.turned(point.uv, track.motion) : outlook.turned(point.uv);
-    const cv::Point2f without = knows_motion ? outlook.on(track.motion) : cv::Point2f();
-    if (const cv::Point2f off = with - without; off.dot(off) > kSameStart_px * kSameStart_px) {
-      ++num_probes;
-      num_with += align(point, with, level).correlation >= kMinCorrelation ? 1 : 0;
-      num_without += align(point, without, level).correlation >= kMinCorrelation ? 1 : 0;
-    }
-  }
-  return num_with >= std::max<double>(num_without, kFewFound * num_probes);
-}
-
-std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& from, View& to) {
-  const auto& image = static_cast<const PatchPyramid&>(*to.image);
-  const Pyramid pyramid = image.bordered;
-  const int coarsest = static_cast<int>(pyramid.size()) - 1;
-  const int top = coarsest - 1;
-  const int predicted = std::min(kPredictedLevel, top);
-  Motions motions(from.points.size());
-  const auto align = [&](const Point& point, const cv::Point2f& motion, int first_level) {
-    const Track& track = tracks_.at(point.id);
-    const cv::Point2f start = point.uv + motion;
-    return align_patch(track.patch, pyramid, {start.x, start.y, track.warp.a, track.warp.b},
-                       first_level);
-  };
-  const Outlook outlook(from, to);
-  const bool is_turned = outlook.knows_turn() && leads_to_points(outlook, from, align, top);
-  if (is_turned) {
-    to.turn = from.turn_to_newest;
-  }
-  const auto near = [&](const cv::Point2f& uv) {
-    return motions.empty() && is_turned ? outlook.turned(uv) : motions.near(uv);
-  };
-  // First the points that were tracked to here: they tell the others where to look.
-  std::vector<PatchMatch> found(from.points.size());
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    const Point& point = from.points[i];
-    const Track& track = tracks_.at(point.id);
-    if (track.frame == from.frame) {
-      found[i] = align(
-          point, is_turned ? outlook.turned(point.uv, track.motion) : outlook.on(track.motion),
-          predicted);
-      if (found[i].correlation >= kMinCorrelation) {
-        motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
-      }
-    }
-  }
-  std::vector<std::optional<cv::Point2f>> result(found.size());
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    const Point& point = from.points[i];
-    const Track& track = tracks_.at(point.id);
-    if (found[i].correlation < kMinCorrelation) {
-      const cv::Point2f motion = near(point.uv);
-      const bool is_predicted = track.frame != from.frame && !motions.empty();
-      found[i] = align(point, motion, is_predicted ? predicted : top);
-      if (found[i].correlation < kMinCorrelation && is_predicted) {
-        found[i] = align(point, motion, top);
-      }
-    }
-  }
-  const auto is_found = [](const PatchMatch& one) { return one.correlation >= kMinCorrelation; };
-  const auto num_found = static_cast<double>(std::ranges::count_if(found, is_found));
-  const bool is_far =
-      top < Patch::kNumCoarse && num_found < kFewFound * static_cast<double>(found.size());
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    const Point& point = from.points[i];
-    Track& track = tracks_.at(point.id);
-    if (is_far && !is_found(found[i])) {
-      found[i] = align(point, near(point.uv), coarsest);
-      if (is_found(found[i])) {
-        motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
-      }
-    }
-    if (accept(found[i], image, to.frame, point, track)) {
-      result[i] = cv::Point2f(track.warp.x, track.warp.y);
-    }
-  }
-  return result;
-}
-
-bool PatchFrontEnd::accept(const PatchMatch& found,
-                           const PatchPyramid& image,
-                           int frame,
-                           const Point& from,
-                           Track& track) {
-  if (found.correlation < kMinCorrelation) {
-    return false;
-  }
-  track.warp = found.warp;
-  track.motion = cv::Point2f(found.warp.x, found.warp.y) - from.uv;
-  track.frame = frame;
-  const float scale_sq = found.warp.a * found.warp.a + found.warp.b * found.warp.b;
-  constexpr float kMaxSq = kMaxScale * kMaxScale;
-  if (found.correlation >= kGoodCorrelation && scale_sq < kMaxSq && scale_sq * kMaxSq > 1.0F) {
-    return true;
-  }
-  track.warp = {found.warp.x, found.warp.y};
-  return cut_patch(image.bordered, found.warp.x, found.warp.y, track.patch);
-}
-
-std::optional<cv::Point2f> PatchFrontEnd::match_projection(const ImagePyramid& image,
-                                                           const Point& point) {
-  const auto known = tracks_.find(point.id);
-  if (known == tracks_.end()) {
-    return std::nullopt;
-  }
-  Track& track = known->second;
-  const PatchMatch found =
-      align_patch(track.patch, static_cast<const PatchPyramid&>(image).bordered,
-                  {point.uv.x, point.uv.y, track.warp.a, track.warp.b}, kPredictedLevel);
-  const cv::Point2f uv(found.warp.x, found.warp.y);
-  const cv::Point2f off = uv - point.uv;
-  if (found.correlation < kMinAgain || off.dot(off) > kMaxOff_px * kMaxOff_px) {
-    ended_.push_back(tracks_.extract(known));
-    return std::nullopt;
-  }
-  track.warp = found.warp;
-  return uv;
-}
-
-void PatchFrontEnd::end_other_tracks(const std::vector<Point>& last,
-                                     const std::vector<Point>& good,
-                                     const Observations& expected) {
-  const auto has = [](const auto& points, auto id_of, int id) {
-    const auto found = std::ranges::lower_bound(points, id, {}, id_of);
-    return found != points.end() && std::invoke(id_of, *found) == id;
-  };
-  for (auto track = tracks_.begin(); track != tracks_.end();) {
-    const int id = track->first;
-    const bool goes_on = has(last, &Point::id, id) || has(good, &Point::id, id) ||
-                         has(expected, &Observation::track_id, id);
-    const auto current = track++;
-    if (!goes_on) {
-      ended_.push_back(tracks_.extract(current));
-    }
-  }
+std::unique_ptr<FrontEnd> create_patch_front_end(const FeatureOptions& options) {
+  return std::make_unique<PatchFrontEnd>(options);
 }
 
 }  // namespace stemvo

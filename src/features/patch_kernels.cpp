@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "features/patch_kernels.hpp"
-
 #include <bit>
 #include <cmath>
 #include <cstring>
+
+#include "features/patch_alignment.hpp"
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -216,41 +216,10 @@ void sample_fine_portable(const BorderedImage& image, const Similarity& warp, Fi
   }
 }
 
-void sample_coarse_portable(const BorderedImage& image, float x, float y, CoarseValues& values) {
-  sample_coarse(image, x, y, values);
-}
-void coarse_sums_portable(
-    const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums) {
-  coarse_sums(image, x, y, patch, sums);
-}
-void fine_sums_portable(const FineValues& values,
-                        const FineColumns& columns,
-                        const FineValues& value,
-                        float* sums) {
-  fine_sums(values, columns, value, sums);
-}
-
-constexpr PatchKernels kPortable{sample_coarse_portable, coarse_sums_portable, sample_fine_portable,
-                                 fine_sums_portable};
+constexpr PatchKernels kPortable{portable_copy<sample_coarse>, portable_copy<coarse_sums>,
+                                 sample_fine_portable, portable_copy<fine_sums>};
 
 #if defined(__x86_64__)
-STEMVO_AVX2 void sample_coarse_avx2(const BorderedImage& image,
-                                    float x,
-                                    float y,
-                                    CoarseValues& values) {
-  sample_coarse(image, x, y, values);
-}
-STEMVO_AVX2 void coarse_sums_avx2(
-    const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums) {
-  coarse_sums(image, x, y, patch, sums);
-}
-STEMVO_AVX2 void fine_sums_avx2(const FineValues& values,
-                                const FineColumns& columns,
-                                const FineValues& value,
-                                float* sums) {
-  fine_sums(values, columns, value, sums);
-}
-
 STEMVO_AVX2 STEMVO_INLINE void catmull_rom(__m256 t, __m256* w) {
   const __m256 half = _mm256_set1_ps(0.5F);
   const __m256 one = _mm256_set1_ps(1.0F);
@@ -307,8 +276,8 @@ STEMVO_AVX2 void sample_fine_avx2(const BorderedImage& image,
   }
 }
 
-constexpr PatchKernels kAvx2{sample_coarse_avx2, coarse_sums_avx2, sample_fine_avx2,
-                             fine_sums_avx2};
+constexpr PatchKernels kAvx2{avx2_copy<sample_coarse>, avx2_copy<coarse_sums>, sample_fine_avx2,
+                             avx2_copy<fine_sums>};
 #endif
 
 }  // namespace

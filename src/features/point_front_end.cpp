@@ -8,7 +8,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "features/grid_quota.hpp"
+#include "features/front_end.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -35,10 +35,6 @@ bool is_allowed(const cv::Mat& mask, const cv::Point2f& uv) {
 }
 
 }  // namespace
-
-int PointFrontEnd::num_levels(double scale) const {
-  return std::max(1, options_.klt_levels - std::ilogb(scale));
-}
 
 Matches PointFrontEnd::process(std::shared_ptr<const ImagePyramid> image, const ImageClue& clue) {
   if (last_.image != nullptr &&
@@ -92,23 +88,15 @@ bool PointFrontEnd::is_lost(const Matches& matches, const View& from) {
 }
 
 void PointFrontEnd::remove_outliers(const std::vector<char>& is_inlier) {
-  if (is_inlier.size() != last_.points.size()) {
-    return;
+  if (is_inlier.size() == last_.points.size()) {
+    auto flag = is_inlier.begin();
+    std::erase_if(last_.points, [&](const Point&) { return *flag++ == 0; });
   }
-  std::vector<Point> kept;
-  kept.reserve(is_inlier.size());
-  for (std::size_t i = 0; i < is_inlier.size(); ++i) {
-    if (is_inlier[i] != 0) {
-      kept.push_back(last_.points[i]);
-    }
-  }
-  last_.points = std::move(kept);
 }
 
 Matches PointFrontEnd::track(const View& from, View& to) {
   Matches matches;
   matches.prev_frame = from.frame;
-  matches.num_keypoints = static_cast<int>(from.points.size());
   const std::vector<std::optional<cv::Point2f>> found =
       timed(Stage::kTracking, [&] { return track_points(from, to); });
   to.interval_s = to.time_s - from.time_s;

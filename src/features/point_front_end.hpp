@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -52,7 +54,9 @@ class PointFrontEnd : public FrontEnd {
   [[nodiscard]] const FeatureOptions& options() const { return options_; }
   /// Levels of a pyramid over an image of the given scale (input pixels per pixel): an image of
   /// half the input's size is its pyramid's second level.
-  [[nodiscard]] int num_levels(double scale) const;
+  [[nodiscard]] int num_levels(double scale) const {
+    return std::max(1, options_.klt_levels - std::ilogb(scale));
+  }
 
  private:
   /// A new corner; false: it cannot be tracked.

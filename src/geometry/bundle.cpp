@@ -32,40 +32,6 @@ std::vector<Eigen::Matrix3d> rotations_of(const Bundle& bundle) {
   return rotations;
 }
 
-/// The normal equations without the points: the camera first, then the free poses.
-class ReducedEquations {
- public:
-  ReducedEquations(const Bundle& bundle, const BundleOptions& options)
-      : options_(options),
-        num_camera_(options.camera ? kCamera : 0),
-        equations_(bundle, options.num_fixed_poses, options.camera.has_value()),
-        size_(num_camera_ + 6 * equations_.num_free_poses()),
-        reduced_(size_, size_),
-        gradient_(size_),
-        diagonal_(size_) {}
-
-  /// Around the bundle, with the points' blocks damped.
-  void linearize(const Bundle& bundle, const std::vector<Reprojection>& at, double damping);
-  /// Moves `bundle` by the solution; false where there is none.
-  [[nodiscard]] bool step(double damping,
-                          const IntrinsicsDelta& from_prior,
-                          Bundle& bundle,
-                          IntrinsicsDelta& camera_change) const;
-  [[nodiscard]] CameraInformation camera_information() const;
-
- private:
-  void move_points(const Eigen::VectorXd& change, Bundle& bundle) const;
-  [[nodiscard]] int row_of(int free_pose) const { return num_camera_ + 6 * free_pose; }
-
-  BundleOptions options_;
-  int num_camera_;
-  NormalEquations equations_;
-  int size_;
-  Eigen::MatrixXd reduced_;  ///< upper triangle
-  Eigen::VectorXd gradient_;
-  Eigen::VectorXd diagonal_;  ///< before the elimination
-};
-
 template <std::size_t kColumns>
 void copy(const NormalEquations::Block<kColumns>& from,
           int num_rows,
@@ -85,109 +51,133 @@ void move_camera(const IntrinsicsDelta& change, Bundle& bundle) {
   bundle.radial += change.tail<2>();
 }
 
-void ReducedEquations::linearize(const Bundle& bundle,
-                                 const std::vector<Reprojection>& at,
-                                 double damping) {
-  equations_.add_up(bundle, at, damping);
-  const NormalEquations::Block<2> of_camera = {equations_.camera.gradient,
-                                               equations_.camera.diagonal};
-  Eigen::Matrix<double, Eigen::Dynamic, 2> columns(size_, 2);  // gradient, diagonal
-  copy(of_camera, num_camera_, columns.topRows(num_camera_));
-  copy(equations_.camera.with_camera, num_camera_,
-       reduced_.topLeftCorner(num_camera_, num_camera_));
-  for (int j = 0; j < equations_.num_free_poses(); ++j) {
-    const NormalEquations::Pose& pose = equations_.poses[static_cast<std::size_t>(j)];
-    copy(NormalEquations::Block<2>{pose.gradient, pose.diagonal}, 6,
-         columns.middleRows<6>(row_of(j)));
-    copy(pose.with_camera, num_camera_, reduced_.block(0, row_of(j), num_camera_, 6));
-    for (int i = 0; i <= j; ++i) {
-      copy(equations_.H_pp[equations_.index_of(i, j)], 6,
-           reduced_.block<6, 6>(row_of(i), row_of(j)));
-    }
-  }
-  gradient_ = columns.col(0);
-  diagonal_ = columns.col(1);
-}
+/// The normal equations without the points: the camera first, then the free poses.
+class ReducedEquations {
+ public:
+  ReducedEquations(const Bundle& bundle, const BundleOptions& options)
+      : options_(options),
+        num_camera_(options.camera ? kCamera : 0),
+        equations_(bundle, options.num_fixed_poses, options.camera.has_value()),
+        size_(num_camera_ + 6 * equations_.num_free_poses()),
+        reduced_(size_, size_),
+        gradient_(size_),
+        diagonal_(size_) {}
 
-bool ReducedEquations::step(double damping,
-                            const IntrinsicsDelta& from_prior,
-                            Bundle& bundle,
-                            IntrinsicsDelta& camera_change) const {
-  Eigen::MatrixXd damped = reduced_;
-  Eigen::VectorXd gradient = gradient_;
-  damped.diagonal() += damping * diagonal_;
-  if (num_camera_ > 0) {
-    damped.topLeftCorner<kCamera, kCamera>() += options_.camera->information;
-    gradient.head<kCamera>() += options_.camera->information * from_prior;
-  }
-  const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> solver(damped);
-  const Eigen::VectorXd change = -solver.solve(gradient);
-  if (solver.info() != Eigen::Success || !change.allFinite()) {
-    return false;
-  }
-  move_points(change, bundle);
-  for (std::size_t i = static_cast<std::size_t>(options_.num_fixed_poses);
-       i < bundle.camera_from_world.size(); ++i) {
-    const Vector6 of_pose =
-        change.segment<6>(num_camera_ + 6 * (static_cast<int>(i) - options_.num_fixed_poses));
-    const Eigen::Quaterniond turn = so3_exp(of_pose.head<3>());
-    Rigid3& pose = bundle.camera_from_world[i];
-    pose = Rigid3(turn * pose.rotation, turn * pose.translation + of_pose.tail<3>());
-  }
-  if (num_camera_ > 0) {
-    camera_change = change.head<kCamera>();
-    move_camera(camera_change, bundle);
-  }
-  return true;
-}
-
-void ReducedEquations::move_points(const Eigen::VectorXd& change, Bundle& bundle) const {
-  const auto times = [](const NormalEquations::Block<3>& block, const auto& by) {
-    Eigen::Vector3d result;
-    for (std::size_t c = 0; c < block.size(); ++c) {
-      double sum = 0.0;
-      for (int r = 0; r < by.size(); ++r) {
-        sum += block[c][r] * by[r];
+  /// Around the bundle, with the points' blocks damped.
+  void linearize(const Bundle& bundle, const std::vector<Reprojection>& at, double damping) {
+    equations_.add_up(bundle, at, damping);
+    const NormalEquations::Block<2> of_camera = {equations_.camera.gradient,
+                                                 equations_.camera.diagonal};
+    Eigen::Matrix<double, Eigen::Dynamic, 2> columns(size_, 2);  // gradient, diagonal
+    copy(of_camera, num_camera_, columns.topRows(num_camera_));
+    copy(equations_.camera.with_camera, num_camera_,
+         reduced_.topLeftCorner(num_camera_, num_camera_));
+    for (int j = 0; j < equations_.num_free_poses(); ++j) {
+      const NormalEquations::Pose& pose = equations_.poses[static_cast<std::size_t>(j)];
+      copy(NormalEquations::Block<2>{pose.gradient, pose.diagonal}, 6,
+           columns.middleRows<6>(row_of(j)));
+      copy(pose.with_camera, num_camera_, reduced_.block(0, row_of(j), num_camera_, 6));
+      for (int i = 0; i <= j; ++i) {
+        copy(equations_.H_pp[equations_.index_of(i, j)], 6,
+             reduced_.block<6, 6>(row_of(i), row_of(j)));
       }
-      result[static_cast<int>(c)] = sum;
     }
-    return result;
-  };
-  const auto& all = bundle.observations;
-  for (std::size_t i = 0; i < all.size();) {
-    const auto index = static_cast<std::size_t>(all[i].point);
-    const NormalEquations::Point& point = equations_.points[index];
-    Eigen::Vector3d rest(point.gradient[0], point.gradient[1], point.gradient[2]);
+    gradient_ = columns.col(0);
+    diagonal_ = columns.col(1);
+  }
+
+  /// Moves `bundle` by the solution; false where there is none.
+  [[nodiscard]] bool step(double damping,
+                          const IntrinsicsDelta& from_prior,
+                          Bundle& bundle,
+                          IntrinsicsDelta& camera_change) const {
+    Eigen::MatrixXd damped = reduced_;
+    Eigen::VectorXd gradient = gradient_;
+    damped.diagonal() += damping * diagonal_;
     if (num_camera_ > 0) {
-      rest += times(point.with_camera, change.head<kCamera>());
+      damped.topLeftCorner<kCamera, kCamera>() += options_.camera->information;
+      gradient.head<kCamera>() += options_.camera->information * from_prior;
     }
-    for (; i < all.size() && all[i].point == static_cast<int>(index); ++i) {
-      if (const int free = all[i].pose - options_.num_fixed_poses; free >= 0) {
-        rest += times(equations_.H_pl[i], change.segment<6>(row_of(free)));
-      }
+    const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> solver(damped);
+    const Eigen::VectorXd change = -solver.solve(gradient);
+    if (solver.info() != Eigen::Success || !change.allFinite()) {
+      return false;
     }
-    Eigen::Matrix3d inverse;
-    for (int c = 0; c < 3; ++c) {
-      const NormalEquations::Lanes4& column = point.inverse[c];
-      inverse.col(c) << column[0], column[1], column[2];
+    move_points(change, bundle);
+    for (std::size_t i = static_cast<std::size_t>(options_.num_fixed_poses);
+         i < bundle.camera_from_world.size(); ++i) {
+      const Vector6 of_pose =
+          change.segment<6>(num_camera_ + 6 * (static_cast<int>(i) - options_.num_fixed_poses));
+      const Eigen::Quaterniond turn = so3_exp(of_pose.head<3>());
+      Rigid3& pose = bundle.camera_from_world[i];
+      pose = Rigid3(turn * pose.rotation, turn * pose.translation + of_pose.tail<3>());
     }
-    bundle.points[index] -= inverse * rest;
+    if (num_camera_ > 0) {
+      camera_change = change.head<kCamera>();
+      move_camera(camera_change, bundle);
+    }
+    return true;
   }
-}
 
-CameraInformation ReducedEquations::camera_information() const {
-  const int rest = size_ - num_camera_;
-  Eigen::MatrixXd poses = reduced_.bottomRightCorner(rest, rest);
-  poses.diagonal() += 1e-9 * diagonal_.tail(rest);  // lengths may be free
-  const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> solver(poses);
-  if (solver.info() != Eigen::Success) {
-    return CameraInformation::Zero();
+  [[nodiscard]] CameraInformation camera_information() const {
+    const int rest = size_ - num_camera_;
+    Eigen::MatrixXd poses = reduced_.bottomRightCorner(rest, rest);
+    poses.diagonal() += 1e-9 * diagonal_.tail(rest);  // lengths may be free
+    const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> solver(poses);
+    if (solver.info() != Eigen::Success) {
+      return CameraInformation::Zero();
+    }
+    const Eigen::MatrixXd mixed = reduced_.topRightCorner(num_camera_, rest);
+    const CameraInformation information =
+        reduced_.topLeftCorner<kCamera, kCamera>() - mixed * solver.solve(mixed.transpose());
+    return 0.5 * (information + information.transpose());
   }
-  const Eigen::MatrixXd mixed = reduced_.topRightCorner(num_camera_, rest);
-  const CameraInformation information =
-      reduced_.topLeftCorner<kCamera, kCamera>() - mixed * solver.solve(mixed.transpose());
-  return 0.5 * (information + information.transpose());
-}
+
+ private:
+  void move_points(const Eigen::VectorXd& change, Bundle& bundle) const {
+    const auto times = [](const NormalEquations::Block<3>& block, const auto& by) {
+      Eigen::Vector3d result;
+      for (std::size_t c = 0; c < block.size(); ++c) {
+        double sum = 0.0;
+        for (int r = 0; r < by.size(); ++r) {
+          sum += block[c][r] * by[r];
+        }
+        result[static_cast<int>(c)] = sum;
+      }
+      return result;
+    };
+    const auto& all = bundle.observations;
+    for (std::size_t i = 0; i < all.size();) {
+      const auto index = static_cast<std::size_t>(all[i].point);
+      const NormalEquations::Point& point = equations_.points[index];
+      Eigen::Vector3d rest(point.gradient[0], point.gradient[1], point.gradient[2]);
+      if (num_camera_ > 0) {
+        rest += times(point.with_camera, change.head<kCamera>());
+      }
+      for (; i < all.size() && all[i].point == static_cast<int>(index); ++i) {
+        if (const int free = all[i].pose - options_.num_fixed_poses; free >= 0) {
+          rest += times(equations_.H_pl[i], change.segment<6>(row_of(free)));
+        }
+      }
+      Eigen::Matrix3d inverse;
+      for (int c = 0; c < 3; ++c) {
+        const NormalEquations::Lanes4& column = point.inverse[c];
+        inverse.col(c) << column[0], column[1], column[2];
+      }
+      bundle.points[index] -= inverse * rest;
+    }
+  }
+
+  [[nodiscard]] int row_of(int free_pose) const { return num_camera_ + 6 * free_pose; }
+
+  BundleOptions options_;
+  int num_camera_;
+  NormalEquations equations_;
+  int size_;
+  Eigen::MatrixXd reduced_;  ///< upper triangle
+  Eigen::VectorXd gradient_;
+  Eigen::VectorXd diagonal_;  ///< before the elimination
+};
 
 /// Every observation under the bundle, and the robust cost: infinite where a point is behind a pose
 /// that sees it.

@@ -7,6 +7,10 @@
 
 namespace stemvo {
 
+/// Lengths of errors with equal sigmas in u and v have Rayleigh's distribution: its median is so
+/// many sigmas.
+inline constexpr double kMedianOfRayleigh = 1.1774;
+
 /// The middle value, of an even number the upper one of the two; 0 of none.
 inline double median(std::vector<double> values) {
   if (values.empty()) {

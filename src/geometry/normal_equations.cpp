@@ -216,8 +216,8 @@ STEMVO_INLINE void eliminate(const Bundle& bundle,
 }
 
 STEMVO_INLINE void add_up_points(const Bundle& bundle,
-                                 const Reprojection* at,
-                                 const Rotation* rotations,
+                                 const std::vector<Reprojection>& at,
+                                 const std::vector<Rotation>& rotations,
                                  double damping,
                                  NormalEquations& equations) {
   const Bundle::Observation* observations = bundle.observations.data();
@@ -228,40 +228,11 @@ STEMVO_INLINE void add_up_points(const Bundle& bundle,
     point = {};
     std::size_t end = begin;
     for (; end < size && observations[end].point == index; ++end) {
-      add_observation(bundle, end, at[end], rotations, point, equations);
+      add_observation(bundle, end, at.data()[end], rotations.data(), point, equations);
     }
     eliminate(bundle, begin, end, damping, point, equations);
     begin = end;
   }
-}
-
-using AddUpPoints =
-    void (*)(const Bundle&, const Reprojection*, const Rotation*, double, NormalEquations&);
-
-void add_up_points_portable(const Bundle& bundle,
-                            const Reprojection* at,
-                            const Rotation* rotations,
-                            double damping,
-                            NormalEquations& equations) {
-  add_up_points(bundle, at, rotations, damping, equations);
-}
-
-#if defined(__x86_64__)
-STEMVO_AVX2 void add_up_points_avx2(const Bundle& bundle,
-                                    const Reprojection* at,
-                                    const Rotation* rotations,
-                                    double damping,
-                                    NormalEquations& equations) {
-  add_up_points(bundle, at, rotations, damping, equations);
-}
-#endif
-
-AddUpPoints of_this_process() {
-#if defined(__x86_64__)
-  return uses_avx2() ? add_up_points_avx2 : add_up_points_portable;
-#else
-  return add_up_points_portable;
-#endif
 }
 
 }  // namespace
@@ -280,14 +251,6 @@ Reprojection::Reprojection(const Bundle& bundle,
                             bundle.camera.fy_px * v * stretch + bundle.camera.cy_px) -
             observation.uv) {}
 
-NormalEquations::NormalEquations(const Bundle& bundle, int fixed, bool with_camera)
-    : num_fixed_poses(fixed),
-      has_camera(with_camera),
-      poses(bundle.camera_from_world.size() - static_cast<std::size_t>(fixed)),
-      H_pp(poses.size() * (poses.size() + 1) / 2),
-      points(bundle.points.size()),
-      H_pl(bundle.observations.size()) {}
-
 void NormalEquations::add_up(const Bundle& bundle,
                              const std::vector<Reprojection>& at,
                              double damping) {
@@ -301,7 +264,7 @@ void NormalEquations::add_up(const Bundle& bundle,
         Rotation{{Lanes4{r(0, 0), r(0, 1), r(0, 2), 0.0}, Lanes4{r(1, 0), r(1, 1), r(1, 2), 0.0},
                   Lanes4{r(2, 0), r(2, 1), r(2, 2), 0.0}}});
   }
-  of_this_process()(bundle, at.data(), rotations.data(), damping, *this);
+  run_body<add_up_points>(bundle, at, rotations, damping, *this);
 }
 
 }  // namespace stemvo

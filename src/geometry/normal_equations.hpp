@@ -60,7 +60,13 @@ struct NormalEquations {
     Block<kCamera> with_camera;
   };
 
-  NormalEquations(const Bundle& bundle, int num_fixed_poses, bool has_camera);
+  NormalEquations(const Bundle& bundle, int fixed, bool with_camera)
+      : num_fixed_poses(fixed),
+        has_camera(with_camera),
+        poses(bundle.camera_from_world.size() - static_cast<std::size_t>(fixed)),
+        H_pp(poses.size() * (poses.size() + 1) / 2),
+        points(bundle.points.size()),
+        H_pl(bundle.observations.size()) {}
 
   /// Around the bundle; `at` is where it sees each observation. The last digits are those of this
   /// process's instruction set.

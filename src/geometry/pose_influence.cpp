@@ -41,14 +41,6 @@ Matrix6d adjoint(const Rigid3& b_from_a) {
   return result;
 }
 
-Matrix6d PoseInfluences::squared_sum() const {
-  Matrix6d sum = Matrix6d::Zero();
-  for (const Vector6d& influence : of_point) {
-    sum.noalias() += influence * influence.transpose();
-  }
-  return sum;
-}
-
 PoseInfluences pose_influences(const Rigid3& camera_from_world,
                                std::span<const Eigen::Vector3d> points_in_world,
                                std::span<const Eigen::Vector2d> uv,
@@ -79,7 +71,6 @@ PoseInfluences pose_influences(const Rigid3& camera_from_world,
     pulls.push_back(pull);
   }
   PoseInfluences result;
-  result.num_points = static_cast<int>(pulls.size());
   result.covariance = inverse_of<6>(curvature);
   result.of_point.assign(points_in_world.size(), Vector6d::Zero());
   for (const Pull& pull : pulls) {

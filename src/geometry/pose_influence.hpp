@@ -27,10 +27,15 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 struct PoseInfluences {
   std::vector<Vector6d> of_point;          ///< zero: behind the camera
   Matrix6d covariance = Matrix6d::Zero();  ///< for weighted residuals of 1 px; finite
-  int num_points = 0;                      ///< in front of the camera
 
   /// Covariance of the pose where the errors of the points are independent.
-  [[nodiscard]] Matrix6d squared_sum() const;
+  [[nodiscard]] Matrix6d squared_sum() const {
+    Matrix6d sum = Matrix6d::Zero();
+    for (const Vector6d& influence : of_point) {
+      sum.noalias() += influence * influence.transpose();
+    }
+    return sum;
+  }
 };
 /// `loss_scale_px`: of the refinement (Cauchy); infinity: every residual has weight 1.
 [[nodiscard]] PoseInfluences pose_influences(const Rigid3& camera_from_world,

@@ -47,8 +47,8 @@ struct Nearest {
 
 STEMVO_INLINE void find_nearest(std::span<const Descriptor> first,
                                 std::span<const Descriptor> second,
-                                std::span<Nearest> of_first,
-                                std::span<Nearest> of_second) {
+                                std::vector<Nearest>& of_first,
+                                std::vector<Nearest>& of_second) {
   for (std::size_t i = 0; i < first.size(); ++i) {
     if (first[i] == kNoDescriptor) {
       continue;
@@ -60,14 +60,6 @@ STEMVO_INLINE void find_nearest(std::span<const Descriptor> first,
     }
   }
 }
-#if defined(__x86_64__)
-STEMVO_POPCNT void find_nearest_avx2(std::span<const Descriptor> first,
-                                     std::span<const Descriptor> second,
-                                     std::span<Nearest> of_first,
-                                     std::span<Nearest> of_second) {
-  find_nearest(first, second, of_first, of_second);
-}
-#endif
 
 }  // namespace
 
@@ -108,16 +100,6 @@ std::vector<Descriptor> describe(const ChannelImage& channel,
   return descriptors;
 }
 
-std::span<const Descriptor> LookDescriptors::other(std::size_t i) {
-  if (!describe_as_) {
-    return as_is_;
-  }
-  if (others_[i].empty()) {
-    others_[i] = describe_as_(kOtherLooks[i]);
-  }
-  return others_[i];
-}
-
 std::span<const Descriptor> LookDescriptors::for_magnification(double magnification) {
   const auto off = [&](double scale) { return std::abs(std::log(scale * magnification)); };
   const auto* const best = std::ranges::min_element(kOtherScales, {}, off);
@@ -129,15 +111,7 @@ std::vector<DescriptorPair> match_descriptors(std::span<const Descriptor> first,
                                               std::span<const Descriptor> second) {
   std::vector<Nearest> of_first(first.size());
   std::vector<Nearest> of_second(second.size());
-#if defined(__x86_64__)
-  if (uses_avx2()) {
-    find_nearest_avx2(first, second, of_first, of_second);
-  } else {
-    find_nearest(first, second, of_first, of_second);
-  }
-#else
-  find_nearest(first, second, of_first, of_second);
-#endif
+  run_body<find_nearest>(first, second, of_first, of_second);
   std::vector<DescriptorPair> pairs;
   for (std::size_t i = 0; i < first.size(); ++i) {
     const Nearest& nearest = of_first[i];

@@ -58,7 +58,15 @@ class LookDescriptors {
 
   [[nodiscard]] std::span<const Descriptor> as_is() const { return as_is_; }
   /// As kOtherLooks[i].
-  [[nodiscard]] std::span<const Descriptor> other(std::size_t i);
+  [[nodiscard]] std::span<const Descriptor> other(std::size_t i) {
+    if (!describe_as_) {
+      return as_is_;
+    }
+    if (others_[i].empty()) {
+      others_[i] = describe_as_(kOtherLooks[i]);
+    }
+    return others_[i];
+  }
   /// The scale's descriptors that are nearest to a view which this one magnifies.
   [[nodiscard]] std::span<const Descriptor> for_magnification(double magnification);
 

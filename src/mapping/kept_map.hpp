@@ -89,6 +89,10 @@ struct KeptMap {
   std::vector<Loop> loops;                     ///< that were found, or are made of such
   std::vector<MapLength> lengths;              ///< where somebody measured metres
   std::vector<MergedKeyframe> merged;          ///< in the order of their frames
+
+  [[nodiscard]] const Similarity3& pose(int keyframe) const {
+    return map_from_keyframe[slot(keyframe)];
+  }
 };
 
 /// Frames that show one place, the earlier one first; those of another recording are negative.

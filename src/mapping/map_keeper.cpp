@@ -8,23 +8,104 @@
 #include <utility>
 #include <vector>
 
+#include "geometry/median.hpp"
+#include "geometry/pose_influence.hpp"
 #include "mapping/map_merge.hpp"
-#include "mapping/map_motions.hpp"
+#include "odometry/localization.hpp"
 
 namespace stemvo {
 namespace {
 
 /// Both in the order of their tracks.
 void take_landmarks(const std::vector<KeptCorner>& from, std::vector<KeptCorner>& to) {
-  auto other = from.begin();
   for (KeptCorner& corner : to) {
-    while (other != from.end() && other->track_id < corner.track_id) {
-      ++other;
-    }
-    if (other != from.end() && other->track_id == corner.track_id) {
-      corner.in_camera = other->in_camera;
+    const auto same = std::ranges::lower_bound(from, corner.track_id, {}, &KeptCorner::track_id);
+    if (same != from.end() && same->track_id == corner.track_id) {
+      corner.in_camera = same->in_camera;
     }
   }
+}
+
+/// Errors of a track's points are alike: so many times the sigmas of independent ones.
+constexpr double kAlikeFactor = 3.0;
+/// Standard deviations of a motion between two keyframes: what a camera bends besides the noise of
+/// tracks. Rotation, share of the depth, scale.
+constexpr double kMotionSigma_rad = 5e-4;
+constexpr double kMotionSigma = 2e-3;
+constexpr double kMotionLogScale = 6e-3;
+/// A guess's standard deviations of the rotation, and of log(scale).
+constexpr double kGuess_rad = 1.0;
+constexpr double kGuessLogScale = 1.0;
+
+Similarity3 scaled(double factor, const Rigid3& motion) {
+  return {1.0, motion.rotation, factor * motion.translation};
+}
+
+/// How well the landmarks that both keyframes see carry the scale over: each by the parallax that
+/// its depth comes from, of points with a noise of 1 px.
+double log_scale_sigma(const Window& window,
+                       const Keyframe& from,
+                       const Keyframe& to,
+                       double f_px) {
+  const SeenLandmarks shared = find_seen_landmarks(window, from.points);
+  ObservationWalk walk(window);
+  double information = 0.0;
+  for (std::size_t i = 0; i < shared.points.size(); ++i) {
+    if (find_point(to.points, shared.track_ids[i]) == nullptr) {
+      continue;
+    }
+    const auto seen = walk.seek(shared.track_ids[i]);
+    const double parallax_px =
+        f_px * parallax_rad(shared.points[i],
+                            window.keyframes[seen.front().keyframe].world_from_camera,
+                            window.keyframes[seen.back().keyframe].world_from_camera);
+    information += parallax_px * parallax_px;
+  }
+  return 1.0 / std::sqrt(std::max(information, 1.0));
+}
+
+/// The motion from `from`, which is this node, to `to`, the next one, with its sigmas; each
+/// keyframe has its own unit.
+MapEdge motion_between(const WindowView& view, const Keyframe& from, const Keyframe& to, int node) {
+  const double units_of_from = view.history.units(from.frame);
+  const double units_of_to = view.history.units(to.frame);
+  const Rigid3 from_to = from.world_from_camera.inverse() * to.world_from_camera;
+  MapEdge edge{.from = node, .to = node + 1, .from_to = scaled(units_of_from, from_to)};
+  edge.from_to.scale = units_of_from / units_of_to;
+  const SeenLandmarks seen = find_seen_landmarks(view.window, to.points);
+  const Rigid3 camera_from_world = to.world_from_camera.inverse();
+  std::vector<double> errors;
+  std::vector<double> depths;
+  for (std::size_t i = 0; i < seen.points.size(); ++i) {
+    const Eigen::Vector3d point = camera_from_world * seen.points[i];
+    errors.push_back((view.camera.project(point) - seen.uv[i]).norm());
+    depths.push_back(point.z());
+  }
+  const double depth = depths.empty() ? from_to.translation.norm() : median(std::move(depths));
+  const double noise_px = errors.empty() ? 1.0 : median(std::move(errors)) / kMedianOfRayleigh;
+  const Matrix6d pose =
+      pose_influences(camera_from_world, seen.points, seen.uv, view.camera, noise_px).squared_sum();
+  const auto sigma = [&](const auto& covariance) {
+    return kAlikeFactor * std::sqrt(covariance.trace() / 3.0);
+  };
+  edge.sigma_rad = std::hypot(kMotionSigma_rad, sigma(pose.bottomRightCorner<3, 3>()));
+  edge.sigma_translation =
+      units_of_from * std::hypot(kMotionSigma * depth, sigma(pose.topLeftCorner<3, 3>()));
+  edge.sigma_log_scale = std::hypot(
+      kMotionLogScale, kAlikeFactor * noise_px *
+                           log_scale_sigma(view.window, from, to, view.camera.mean_focal_px()));
+  return edge;
+}
+
+/// The guess that connects the first keyframe of a new map with the last one of the map before.
+MapEdge guessed_motion(const KeptKeyframe& from, const KeptKeyframe& to, int node) {
+  const Rigid3 from_to = from.world_from_camera.inverse() * to.world_from_camera;
+  return {node,
+          node + 1,
+          Similarity3(from_to),
+          kGuess_rad,
+          std::max(1.0, from_to.translation.norm()),
+          kGuessLogScale};
 }
 
 }  // namespace
@@ -82,34 +163,6 @@ void MapKeeper::find_components() {
   std::ranges::for_each(map_.motions, join);
   std::ranges::for_each(map_.loops, join);
   num_components_ = static_cast<int>(components_.size());
-}
-
-int MapKeeper::node_of(int frame) const {
-  const auto node = nodes_.find(frame);
-  return node == nodes_.end() ? -1 : node->second;
-}
-
-bool MapKeeper::has_own(int component) const {
-  for (std::size_t i = 0; i < components_.size(); ++i) {
-    if (components_[i] == component && map_.keyframes[i].frame >= 0) {
-      return true;
-    }
-  }
-  return false;
-}
-
-bool MapKeeper::may_soon_be_joined() const {
-  constexpr std::ptrdiff_t kYoung = 30;
-  return !components_.empty() && component_ != components_.front() &&
-         std::ranges::count(components_, component_) < kYoung;
-}
-
-void MapKeeper::add_nodes(const WindowView& view) {
-  for (const Keyframe& keyframe : view.window.keyframes) {
-    if (node_of(keyframe.frame) < 0 && keyframe.frame < static_cast<int>(view.trajectory.size())) {
-      add_node(view, keyframe);
-    }
-  }
 }
 
 void MapKeeper::add_node(const WindowView& view, const Keyframe& keyframe) {
@@ -296,19 +349,6 @@ void MapKeeper::keep(const WindowView& view, std::size_t leaving) {
     } else if (neighbour == node + 1) {
       map_.motions.push_back(motion_between(view, keyframe, other, node));
     }
-  }
-}
-
-void MapKeeper::leave(const WindowView& view, std::size_t leaving) {
-  keep(view, leaving);
-  nodes_.erase(view.window.keyframes[leaving].frame);
-}
-
-void MapKeeper::close(const WindowView& view) {
-  last_localized_ = view.last_localized;
-  add_nodes(view);
-  for (std::size_t i = 0; i < view.window.keyframes.size(); ++i) {
-    leave(view, i);
   }
 }
 

@@ -42,11 +42,27 @@ class MapKeeper {
   void load(KeptMap map);
 
   /// Makes nodes of the window's keyframes that are none yet, but for those whose frame is in work.
-  void add_nodes(const WindowView& view);
+  void add_nodes(const WindowView& view) {
+    for (const Keyframe& keyframe : view.window.keyframes) {
+      if (node_of(keyframe.frame) < 0 &&
+          keyframe.frame < static_cast<int>(view.trajectory.size())) {
+        add_node(view, keyframe);
+      }
+    }
+  }
   /// A keyframe is about to leave the window.
-  void leave(const WindowView& view, std::size_t leaving);
+  void leave(const WindowView& view, std::size_t leaving) {
+    keep(view, leaving);
+    nodes_.erase(view.window.keyframes[leaving].frame);
+  }
   /// The whole window is about to be dropped; the next one is a new map.
-  void close(const WindowView& view);
+  void close(const WindowView& view) {
+    last_localized_ = view.last_localized;
+    add_nodes(view);
+    for (std::size_t i = 0; i < view.window.keyframes.size(); ++i) {
+      leave(view, i);
+    }
+  }
   /// The next window belongs to the map of this loop's `from`; its first keyframe is the loop's
   /// `to`.
   void begin_at(const Loop& relocation) { relocation_ = relocation; }
@@ -70,7 +86,10 @@ class MapKeeper {
     return map_.map_from_keyframe[slot(node)];
   }
   /// The node of a keyframe of the window; -1: it is none yet.
-  [[nodiscard]] int node_of(int frame) const;
+  [[nodiscard]] int node_of(int frame) const {
+    const auto node = nodes_.find(frame);
+    return node == nodes_.end() ? -1 : node->second;
+  }
 
   /// The correction so far.
   [[nodiscard]] const Similarity3& map_from_world() const { return map_from_world_; }
@@ -78,9 +97,20 @@ class MapKeeper {
   /// the map.
   void correct(const Similarity3& map_from_world) { map_from_world_ = map_from_world; }
   /// A map holds keyframes of this recording.
-  [[nodiscard]] bool has_own(int component) const;
+  [[nodiscard]] bool has_own(int component) const {
+    for (std::size_t i = 0; i < components_.size(); ++i) {
+      if (components_[i] == component && map_.keyframes[i].frame >= 0) {
+        return true;
+      }
+    }
+    return false;
+  }
   /// The window's map is young, and another one is older.
-  [[nodiscard]] bool may_soon_be_joined() const;
+  [[nodiscard]] bool may_soon_be_joined() const {
+    constexpr std::ptrdiff_t kYoung = 30;
+    return !components_.empty() && component_ != components_.front() &&
+           std::ranges::count(components_, component_) < kYoung;
+  }
   [[nodiscard]] std::span<const int> components() const { return components_; }
   [[nodiscard]] int component_of(int node) const { return components_[slot(node)]; }
 

@@ -78,20 +78,12 @@ void measure_scale(const KeptKeyframe& old, const KeptKeyframe& recent, Loop& lo
 
 }  // namespace
 
-Mapper::Mapper(const Options& options)
-    : is_on_(options.odometry.loops), may_begin_threads_(options.threads != 1) {}
-
 /// Work beside the frames. Where no thread can begin, it is done when its result is asked for.
 template <typename Task>
 auto Mapper::begin(Task task) const {
   const auto where =
       may_begin_threads_ ? std::launch::async | std::launch::deferred : std::launch::deferred;
   return std::async(where, std::move(task)).share();
-}
-
-void Mapper::load(KeptMap map) {
-  keeper_.load(std::move(map));
-  recognizer_.load(keeper_.map());
 }
 
 Recognition Mapper::observe(const WindowView& view, std::shared_ptr<const ImagePyramid> image) {
@@ -140,29 +132,6 @@ void Mapper::begin_lookup(const WindowView& view) {
     }
     return work;
   });
-}
-
-void Mapper::finish_lookup() {
-  const auto done = std::exchange(looked_up_, {});
-  if (done.valid()) {
-    keep(done.get(), keeper_);
-    found_ = done.get().loop ? std::optional(done.get()) : std::nullopt;
-  }
-}
-
-void Mapper::keep(const LookedUp& found, MapKeeper& keeper) {
-  KeptKeyframe& kept = keeper.keyframe(found.node);
-  kept.corners = found.keyframe.corners;
-  if (found.is_place) {
-    kept.descriptors = found.keyframe.descriptors;
-  }
-}
-
-/// The newest one.
-void Mapper::add_place(int node, std::vector<Descriptor> descriptors) {
-  KeptKeyframe& keyframe = keeper_.keyframe(node);
-  keyframe.descriptors = std::move(descriptors);
-  recognizer_.add(node, keyframe);
 }
 
 /// Its newer keyframe is in the window still.
@@ -231,13 +200,6 @@ void Mapper::merge() {
     if (located_.has_value()) {
       located_->from = numbers[static_cast<std::size_t>(located_->from)];
     }
-  }
-}
-
-void Mapper::leave(const WindowView& view, std::size_t leaving) {
-  if (is_on_) {
-    finish_lookup();
-    keeper_.leave(view, leaving);
   }
 }
 
@@ -314,14 +276,6 @@ std::optional<Relocation> Mapper::locate(const WindowView& view,
   loop.sigma_log_scale = kSigmaFound;
   located_ = loop;
   return relocation;
-}
-
-void Mapper::begin_at_relocation() {
-  if (located_.has_value()) {
-    keeper_.begin_at(*std::exchange(located_, {}));
-    has_new_loops_ = true;
-    keyframes_until_next_ = 0;
-  }
 }
 
 KeptMap Mapper::map(const WindowView& view) const {

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -39,16 +40,25 @@ struct Relocation {
 /// fixed keyframes: the same on any number of threads. One call at a time.
 class Mapper {
  public:
-  explicit Mapper(const Options& options);
+  explicit Mapper(const Options& options)
+      : is_on_(options.odometry.loops), may_begin_threads_(options.threads != 1) {}
 
   /// Before the first keyframe: what another recording left.
-  void load(KeptMap map);
+  void load(KeptMap map) {
+    keeper_.load(std::move(map));
+    recognizer_.load(keeper_.map());
+  }
   /// The window has a new keyframe, which came with this image; those before it have all their
   /// corners now.
   [[nodiscard]] Recognition observe(const WindowView& view,
                                     std::shared_ptr<const ImagePyramid> image);
   /// A keyframe is about to leave the window.
-  void leave(const WindowView& view, std::size_t leaving);
+  void leave(const WindowView& view, std::size_t leaving) {
+    if (is_on_) {
+      finish_lookup();
+      keeper_.leave(view, leaving);
+    }
+  }
   /// The whole window is about to be dropped. The next one is a new map, unless it begins at a
   /// relocation.
   void close(const WindowView& view);
@@ -63,7 +73,13 @@ class Mapper {
   /// The next frame tells whether the one that locate() was asked for shows a place.
   [[nodiscard]] bool may_be_locating() const { return recognizer_.may_be_locating(); }
   /// The next window begins with the frame that was located last.
-  void begin_at_relocation();
+  void begin_at_relocation() {
+    if (located_.has_value()) {
+      keeper_.begin_at(*std::exchange(located_, {}));
+      has_new_loops_ = true;
+      keyframes_until_next_ = 0;
+    }
+  }
 
   /// The correction so far.
   [[nodiscard]] const Similarity3& map_from_world() const { return keeper_.map_from_world(); }
@@ -88,10 +104,27 @@ class Mapper {
   [[nodiscard]] auto begin(Task task) const;
   void begin_lookup(const WindowView& view);
   /// Waits for the lookup that was begun.
-  void finish_lookup();
-  static void keep(const LookedUp& found, MapKeeper& keeper);
+  void finish_lookup() {
+    const auto done = std::exchange(looked_up_, {});
+    if (done.valid()) {
+      keep(done.get(), keeper_);
+      found_ = done.get().loop ? std::optional(done.get()) : std::nullopt;
+    }
+  }
+  static void keep(const LookedUp& found, MapKeeper& keeper) {
+    KeptKeyframe& kept = keeper.keyframe(found.node);
+    kept.corners = found.keyframe.corners;
+    if (found.is_place) {
+      kept.descriptors = found.keyframe.descriptors;
+    }
+  }
   [[nodiscard]] Recognition take_in(const WindowView& view, const LookedUp& found);
-  void add_place(int node, std::vector<Descriptor> descriptors);
+  /// The newest one.
+  void add_place(int node, std::vector<Descriptor> descriptors) {
+    KeptKeyframe& keyframe = keeper_.keyframe(node);
+    keyframe.descriptors = std::move(descriptors);
+    recognizer_.add(node, keyframe);
+  }
   void keep_last_view(const WindowView& view);
   void solve_graph(const WindowView& view);
   void merge();

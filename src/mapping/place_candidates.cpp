@@ -73,14 +73,6 @@ PlaceIndex::PlaceIndex() {
   tables_.fill(std::vector<Cell>(std::size_t{1} << kBits));
 }
 
-std::uint32_t PlaceIndex::cell_of(const Descriptor& descriptor, int table) const {
-  std::uint32_t cell = 0;
-  for (const std::uint8_t bit : bits_[static_cast<std::size_t>(table)]) {
-    cell = 2 * cell + static_cast<std::uint32_t>(descriptor[bit / 64U] >> (bit % 64U) & 1U);
-  }
-  return cell;
-}
-
 void PlaceIndex::add(int keyframe, std::span<const Descriptor> descriptors) {
   const auto place = static_cast<std::uint32_t>(keyframes_.size());
   keyframes_.push_back(keyframe);
@@ -96,15 +88,10 @@ void PlaceIndex::add(int keyframe, std::span<const Descriptor> descriptors) {
   }
 }
 
-void PlaceIndex::renumber(std::span<const int> numbers) {
-  for (int& keyframe : keyframes_) {
-    keyframe = numbers[static_cast<std::size_t>(keyframe)];
-  }
-}
-
 /// Each descriptor has one vote, which the places that have its like share.
-STEMVO_INLINE void PlaceIndex::vote_for(std::span<const Descriptor> descriptors,
-                                        std::span<Votes> votes) const {
+STEMVO_INLINE void PlaceIndex::vote(const PlaceIndex& index,
+                                    std::span<const Descriptor> descriptors,
+                                    std::vector<Votes>& votes) {
   std::vector<std::uint32_t> places;  // that a descriptor votes for
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
     if (descriptors[i] == kNoDescriptor) {
@@ -112,9 +99,9 @@ STEMVO_INLINE void PlaceIndex::vote_for(std::span<const Descriptor> descriptors,
     }
     places.clear();
     for (int table = 0; table < kTables; ++table) {
-      for (const std::uint32_t index :
-           tables_[static_cast<std::size_t>(table)][cell_of(descriptors[i], table)]) {
-        const Entry& entry = entries_[index];
+      for (const std::uint32_t at :
+           index.tables_[static_cast<std::size_t>(table)][index.cell_of(descriptors[i], table)]) {
+        const Entry& entry = index.entries_[at];
         Votes& place = votes[entry.place];
         if (place.counts && place.last_by != static_cast<int>(i) &&
             differing_bits(descriptors[i], entry.descriptor) <= kVoteBits) {
@@ -129,16 +116,6 @@ STEMVO_INLINE void PlaceIndex::vote_for(std::span<const Descriptor> descriptors,
   }
 }
 
-void PlaceIndex::vote(std::span<const Descriptor> descriptors, std::span<Votes> votes) const {
-  vote_for(descriptors, votes);
-}
-#if defined(__x86_64__)
-STEMVO_POPCNT void PlaceIndex::vote_avx2(std::span<const Descriptor> descriptors,
-                                         std::span<Votes> votes) const {
-  vote_for(descriptors, votes);
-}
-#endif
-
 std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> descriptors,
                                                    const std::function<bool(int keyframe)>& may_be,
                                                    int max_candidates) const {
@@ -146,11 +123,7 @@ std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> d
   for (std::size_t place = 0; place < votes.size(); ++place) {
     votes[place].counts = may_be(keyframes_[place]);
   }
-#if defined(__x86_64__)
-  uses_avx2() ? vote_avx2(descriptors, votes) : vote(descriptors, votes);
-#else
-  vote(descriptors, votes);
-#endif
+  run_body<&PlaceIndex::vote>(*this, descriptors, votes);
   std::vector<PlaceCandidate> best;
   for (std::size_t place = 0; place < votes.size(); ++place) {
     if (votes[place].num > 0.0) {
@@ -176,13 +149,10 @@ std::vector<ExpectedView> expected_views(const KeptMap& map,
                                          std::span<const int> places,
                                          int number,
                                          const KeptKeyframe& keyframe) {
-  const auto pose_of = [&](int node) -> const Similarity3& {
-    return map.map_from_keyframe[slot(node)];
-  };
   std::vector<ExpectedView> views;
   for (const int place : places) {
     const KeptKeyframe& old = map.keyframes[slot(place)];
-    const Similarity3 motion = pose_of(number).inverse() * pose_of(place);
+    const Similarity3 motion = map.pose(number).inverse() * map.pose(place);
     const SharedView there = shared_view(old, keyframe, motion);
     if (there.share < kMinShare) {
       continue;

@@ -27,7 +27,11 @@ class PlaceIndex {
   /// `keyframe`: its number in the map, higher than those before.
   void add(int keyframe, std::span<const Descriptor> descriptors);
   /// Keyframes have new numbers: that of each old one.
-  void renumber(std::span<const int> numbers);
+  void renumber(std::span<const int> numbers) {
+    for (int& keyframe : keyframes_) {
+      keyframe = numbers[static_cast<std::size_t>(keyframe)];
+    }
+  }
   /// The places among those that `may_be` says by their number with the most votes, at most so
   /// many, best first.
   [[nodiscard]] std::vector<PlaceCandidate> candidates(
@@ -49,10 +53,16 @@ class PlaceIndex {
     int last_by = -1;  ///< number of a descriptor
     bool counts = true;
   };
-  void vote_for(std::span<const Descriptor> descriptors, std::span<Votes> votes) const;
-  void vote(std::span<const Descriptor> descriptors, std::span<Votes> votes) const;
-  void vote_avx2(std::span<const Descriptor> descriptors, std::span<Votes> votes) const;
-  [[nodiscard]] std::uint32_t cell_of(const Descriptor& descriptor, int table) const;
+  static void vote(const PlaceIndex& index,
+                   std::span<const Descriptor> descriptors,
+                   std::vector<Votes>& votes);
+  [[nodiscard]] std::uint32_t cell_of(const Descriptor& descriptor, int table) const {
+    std::uint32_t cell = 0;
+    for (const std::uint8_t bit : bits_[static_cast<std::size_t>(table)]) {
+      cell = 2 * cell + static_cast<std::uint32_t>(descriptor[bit / 64U] >> (bit % 64U) & 1U);
+    }
+    return cell;
+  }
 
   std::array<std::array<std::uint8_t, kBits>, kTables> bits_;  ///< the tables' bits
   std::array<std::vector<Cell>, kTables> tables_;

@@ -74,9 +74,6 @@ PlaceView view_of(const KeptKeyframe& keyframe) {
 const KeptKeyframe& keyframe_of(const KeptMap& map, int number) {
   return map.keyframes[slot(number)];
 }
-const Similarity3& pose_of(const KeptMap& map, int number) {
-  return map.map_from_keyframe[slot(number)];
-}
 
 double turn_of(const Similarity3& motion) {
   return Eigen::Quaterniond::Identity().angularDistance(motion.rotation);
@@ -245,11 +242,6 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::expected_looks(const Questio
   return looks;
 }
 
-/// The window remembers places just before in its own map.
-bool PlaceRecognizer::is_far(const Question& question, int place) const {
-  return place < end_of_far() || question.is_elsewhere(place);
-}
-
 std::optional<Sighting> PlaceRecognizer::look_at(const Question& question, const Look& look) const {
   const auto& [map, components, number, keyframe] = question;
   const KeptKeyframe& old = keyframe_of(map, look.place);
@@ -270,12 +262,8 @@ std::optional<Sighting> PlaceRecognizer::look_at(const Question& question, const
 }
 
 bool PlaceRecognizer::has_come_back(const KeptMap& map, const Place& place, int number) const {
-  const Similarity3 net = pose_of(map, place.keyframe).inverse() * pose_of(map, number);
+  const Similarity3 net = map.pose(place.keyframe).inverse() * map.pose(number);
   return place.depth > 0.0 && change_of_view(net, place.depth) < kMaxNetWay * (path_ - place.path);
-}
-
-const PlaceRecognizer::Place& PlaceRecognizer::place_of(int keyframe) const {
-  return *std::ranges::lower_bound(places_, keyframe, {}, &Place::keyframe);
 }
 
 std::vector<int> PlaceRecognizer::neighbours_of(int place) const {
@@ -296,14 +284,6 @@ void PlaceRecognizer::add(int number, const KeptKeyframe& keyframe) {
   kept_tracks_ = track_ids_of(keyframe);
 }
 
-void PlaceRecognizer::renumber(std::span<const int> numbers) {
-  index_.renumber(numbers);
-  for (Place& place : places_) {
-    place.keyframe = numbers[slot(place.keyframe)];
-  }
-  sightings_.renumber(numbers);
-}
-
 std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
                                                     const Camera& camera,
                                                     const std::vector<KeptCorner>& corners,
@@ -318,8 +298,7 @@ std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
     if (!found.has_value()) {
       return Seen::kNothing;
     }
-    const Similarity3 map_from_camera =
-        pose_of(map, look.place) * Similarity3(found->old_from_camera);
+    const Similarity3 map_from_camera = map.pose(look.place) * Similarity3(found->old_from_camera);
     const auto is_near = [&](double max_turn_rad, double max_shift) {
       return [&, max_turn_rad, max_shift](const Similarity3& other) {
         const Similarity3 difference = map_from_camera.inverse() * other;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <optional>
 #include <span>
@@ -56,7 +57,13 @@ class PlaceRecognizer {
   void add(int number, const KeptKeyframe& keyframe);
 
   /// Keyframes have new numbers: that of each old one, -1 where it is none any more.
-  void renumber(std::span<const int> numbers);
+  void renumber(std::span<const int> numbers) {
+    index_.renumber(numbers);
+    for (Place& place : places_) {
+      place.keyframe = numbers[slot(place.keyframe)];
+    }
+    sightings_.renumber(numbers);
+  }
 
   /// The last frame that locate() was asked for is the first that may show a place: the next one
   /// tells.
@@ -105,8 +112,13 @@ class PlaceRecognizer {
   [[nodiscard]] std::vector<Look> expected_looks(const Question& question,
                                                  LookDescriptors& described);
   void begin_lookup(const KeptKeyframe& keyframe);
-  [[nodiscard]] const Place& place_of(int keyframe) const;
-  [[nodiscard]] bool is_far(const Question& question, int place) const;
+  [[nodiscard]] const Place& place_of(int keyframe) const {
+    return *std::ranges::lower_bound(places_, keyframe, {}, &Place::keyframe);
+  }
+  /// The window remembers places just before in its own map.
+  [[nodiscard]] bool is_far(const Question& question, int place) const {
+    return place < end_of_far() || question.is_elsewhere(place);
+  }
   [[nodiscard]] std::optional<Sighting> look_at(const Question& question, const Look& look) const;
   [[nodiscard]] bool has_come_back(const KeptMap& map, const Place& place, int number) const;
   /// Keyframes below this number are far enough before the present one.

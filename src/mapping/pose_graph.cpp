@@ -78,17 +78,69 @@ struct LengthError {
   }
 };
 
+ceres::Problem::Options shared_parts() {
+  ceres::Problem::Options options;
+  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  return options;
+}
+
 /// The graph as Ceres sees it. `map` outlives it.
 class Graph {
  public:
-  explicit Graph(const KeptMap& map);
+  explicit Graph(const KeptMap& map) : problem_(shared_parts()) {
+    std::ranges::transform(map.map_from_keyframe, std::back_inserter(nodes_), node_of);
+    for (Node& node : nodes_) {
+      problem_.AddParameterBlock(node.data(), 8, &manifold_);
+    }
+    problem_.SetManifold(nodes_.front().data(), &scale_alone_);
+    if (map.lengths.empty()) {
+      problem_.SetParameterBlockConstant(nodes_.front().data());
+    }
+    for (const MapEdge& edge : map.motions) {
+      add(edge, nullptr);
+    }
+    for (const Loop& loop : map.loops) {
+      add(loop, &loop_loss_);
+    }
+    for (std::size_t i = 0; i < map.lengths.size(); ++i) {
+      MapLength length = map.lengths[i];
+      length.sigma = independent_sigma(map, i);
+      problem_.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<LengthError, 1, 8>(new LengthError{length}), nullptr,
+          nodes_.at(slot(length.keyframe)).data());
+    }
+  }
 
   /// With loops that are off by `loop_loss` sigmas losing their pull; false: not solved.
-  bool solve(double loop_loss);
-  [[nodiscard]] std::vector<Similarity3> similarities() const;
+  bool solve(double loop_loss) {
+    loop_loss_.Reset(new ceres::CauchyLoss(loop_loss), ceres::TAKE_OWNERSHIP);
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // same bytes with any BLAS
+    options.max_num_iterations = 50;
+    options.function_tolerance = 1e-4;
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem_, &summary);
+    return summary.IsSolutionUsable();
+  }
+
+  [[nodiscard]] std::vector<Similarity3> similarities() const {
+    std::vector<Similarity3> result;
+    std::ranges::transform(nodes_, std::back_inserter(result), similarity_of);
+    return result;
+  }
 
  private:
-  void add(const MapEdge& edge, ceres::LossFunction* loss);
+  void add(const MapEdge& edge, ceres::LossFunction* loss) {
+    STEMVO_CHECK(edge.from != edge.to && edge.sigma_rad > 0.0 && edge.sigma_translation > 0.0 &&
+                     edge.sigma_log_scale > 0.0,
+                 "an edge connects two keyframes and has sigmas");
+    problem_.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<MotionError, 7, 8, 8>(new MotionError{edge}), loss,
+        nodes_.at(slot(edge.from)).data(), nodes_.at(slot(edge.to)).data());
+  }
 
   std::vector<Node> nodes_;
   NodeManifold manifold_;
@@ -97,71 +149,10 @@ class Graph {
   ceres::Problem problem_;
 };
 
-ceres::Problem::Options shared_parts() {
-  ceres::Problem::Options options;
-  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  return options;
-}
-
-Graph::Graph(const KeptMap& map) : problem_(shared_parts()) {
-  std::ranges::transform(map.map_from_keyframe, std::back_inserter(nodes_), node_of);
-  for (Node& node : nodes_) {
-    problem_.AddParameterBlock(node.data(), 8, &manifold_);
-  }
-  problem_.SetManifold(nodes_.front().data(), &scale_alone_);
-  if (map.lengths.empty()) {
-    problem_.SetParameterBlockConstant(nodes_.front().data());
-  }
-  for (const MapEdge& edge : map.motions) {
-    add(edge, nullptr);
-  }
-  for (const Loop& loop : map.loops) {
-    add(loop, &loop_loss_);
-  }
-  for (std::size_t i = 0; i < map.lengths.size(); ++i) {
-    MapLength length = map.lengths[i];
-    length.sigma = independent_sigma(map, i);
-    problem_.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<LengthError, 1, 8>(new LengthError{length}), nullptr,
-        nodes_.at(slot(length.keyframe)).data());
-  }
-}
-
-void Graph::add(const MapEdge& edge, ceres::LossFunction* loss) {
-  STEMVO_CHECK(edge.from != edge.to && edge.sigma_rad > 0.0 && edge.sigma_translation > 0.0 &&
-                   edge.sigma_log_scale > 0.0,
-               "an edge connects two keyframes and has sigmas");
-  problem_.AddResidualBlock(
-      new ceres::AutoDiffCostFunction<MotionError, 7, 8, 8>(new MotionError{edge}), loss,
-      nodes_.at(slot(edge.from)).data(), nodes_.at(slot(edge.to)).data());
-}
-
-bool Graph::solve(double loop_loss) {
-  loop_loss_.Reset(new ceres::CauchyLoss(loop_loss), ceres::TAKE_OWNERSHIP);
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // same bytes with any BLAS
-  options.max_num_iterations = 50;
-  options.function_tolerance = 1e-4;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem_, &summary);
-  return summary.IsSolutionUsable();
-}
-
-std::vector<Similarity3> Graph::similarities() const {
-  std::vector<Similarity3> result;
-  std::ranges::transform(nodes_, std::back_inserter(result), similarity_of);
-  return result;
-}
-
 /// So many standard deviations: motions err alike, and no true loop is to be refused.
 constexpr double kFactor = 5.0;
 /// Variance of a rotation, or of a log scale, that nobody knows.
 constexpr double kUnknown = 1.0;
-/// The graph has taken a loop in that is off by less, all seven errors together.
-constexpr double kMaxLoopSigmas = 5.0;
 
 /// Variances of where one keyframe lies to another one.
 struct Drift {
@@ -182,7 +173,7 @@ std::vector<MapEdge> surest_way(const KeptMap& graph, int from, int to) {
   };
   std::ranges::for_each(graph.motions, add);
   for (const Loop& loop : graph.loops) {
-    if (sigmas_off(graph, loop) < kMaxLoopSigmas) {
+    if (sigmas_off(graph, loop) < kMaxTakenInSigmas) {
       add(loop);
     }
   }
@@ -220,20 +211,17 @@ std::vector<MapEdge> surest_way(const KeptMap& graph, int from, int to) {
 
 /// Each motion's errors move the end by their lever arm.
 Drift drift_along(const KeptMap& graph, const std::vector<MapEdge>& way, const MapEdge& loop) {
-  const auto pose_of = [&](int node) -> const Similarity3& {
-    return graph.map_from_keyframe.at(slot(node));
-  };
   const auto square = [](double value) { return value * value; };
-  const Eigen::Vector3d end = pose_of(loop.to).translation;
+  const Eigen::Vector3d end = graph.pose(loop.to).translation;
   Drift drift;
   for (const MapEdge& motion : way) {
-    const Similarity3& from = pose_of(motion.from);
+    const Similarity3& from = graph.pose(motion.from);
     const double arm = (end - from.translation).norm();
     drift.rotation += square(motion.sigma_rad);
     drift.log_scale += square(motion.sigma_log_scale);
     drift.shift += square(from.scale * motion.sigma_translation) + square(motion.sigma_rad * arm);
     drift.shift_by_scale += square(motion.sigma_log_scale * arm);
-    drift.path += (pose_of(motion.to).translation - from.translation).norm();
+    drift.path += (graph.pose(motion.to).translation - from.translation).norm();
   }
   double sigma_length = 0.0;
   for (const MapLength& length : graph.lengths) {
@@ -263,8 +251,8 @@ double independent_sigma(const KeptMap& map, std::size_t length) {
 }
 
 double sigmas_off(const KeptMap& map, const MapEdge& edge) {
-  const Node from = node_of(map.map_from_keyframe.at(slot(edge.from)));
-  const Node to = node_of(map.map_from_keyframe.at(slot(edge.to)));
+  const Node from = node_of(map.pose(edge.from));
+  const Node to = node_of(map.pose(edge.to));
   Eigen::Matrix<double, 7, 1> error;
   MotionError{edge}(from.data(), to.data(), error.data());
   return error.norm();
@@ -290,8 +278,8 @@ bool is_within_drift(const KeptMap& graph, const MapEdge& loop) {
   if (way.empty() || std::max(drift.rotation, drift.log_scale) >= kUnknown) {
     return true;
   }
-  const Similarity3& old = graph.map_from_keyframe[slot(loop.from)];
-  const Similarity3 told = old.inverse() * graph.map_from_keyframe[slot(loop.to)];
+  const Similarity3& old = graph.pose(loop.from);
+  const Similarity3 told = old.inverse() * graph.pose(loop.to);
   const auto is_small = [](double error, double sigma_of_loop, double variance) {
     return error <= kFactor * std::hypot(sigma_of_loop, std::sqrt(variance));
   };

@@ -9,20 +9,17 @@ namespace stemvo {
 
 /// Moves map_from_keyframe to where motions, loops and lengths agree best, from where it is. Node
 /// 0 stays; its scale moves where the map has lengths, which make the map's unit a metre.
-///
-/// Sigmas that edges should carry, per axis: motions between keyframes that follow each other 0.05
-/// degrees, 0.3 % of the median depth, 1 % of scale per 8 frames at 30 Hz (variances add up along
-/// the frames); loops 0.3 degrees, 1 % of the median depth, 3 % of scale. All are > 0.
-///
-/// Motions and lengths are believed. A loop is under Cauchy's loss: where the others contradict it
-/// by many sigmas it pulls no more. One thread, no clock: the same bytes on every run.
-/// False: nothing to do, or not solved; the map is unchanged.
+/// Motions and lengths are believed; sigmas are above 0 (checked). A loop is under Cauchy's loss:
+/// where the others contradict it by many sigmas it pulls no more. One thread, no clock: the same
+/// bytes on every run. False: nothing to do, or not solved; the map is unchanged.
 bool solve_pose_graph(KeptMap& map);
 
 /// Sigma of a length if its error were like no other one's: a filter remembers, so that lengths
 /// that follow each other err alike.
 [[nodiscard]] double independent_sigma(const KeptMap& map, std::size_t length);
 
+/// The graph has taken a loop in that is off by less (sigmas_off).
+inline constexpr double kMaxTakenInSigmas = 5.0;
 /// How far map_from_keyframe is from what an edge measured: the length of its seven errors in their
 /// sigmas. Of a true one, whose sigmas hold, the square is 7 on average.
 [[nodiscard]] double sigmas_off(const KeptMap& map, const MapEdge& edge);

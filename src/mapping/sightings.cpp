@@ -26,11 +26,10 @@ void Sightings::begin_lookup(int number, double depth) {
 }
 
 bool Sightings::say_the_same(const KeptMap& map, const Sighting& a, const Sighting& b) const {
-  const auto pose_of = [&](int keyframe) { return map.map_from_keyframe[slot(keyframe)]; };
-  const Similarity3 a_from_b = pose_of(a.loop.to).inverse() * pose_of(b.loop.to);
+  const Similarity3 a_from_b = map.pose(a.loop.to).inverse() * map.pose(b.loop.to);
   // The identity, if both are right.
-  const Similarity3 difference = (pose_of(a.loop.from) * a.loop.from_to * a_from_b).inverse() *
-                                 pose_of(b.loop.from) * b.loop.from_to;
+  const Similarity3 difference = (map.pose(a.loop.from) * a.loop.from_to * a_from_b).inverse() *
+                                 map.pose(b.loop.from) * b.loop.from_to;
   return std::abs(std::log(difference.scale)) < kMaxLogScale &&
          Eigen::Quaterniond::Identity().angularDistance(difference.rotation) < kMaxSameTurn_rad &&
          difference.translation.norm() < kMaxSameShift * (depth_ + a_from_b.translation.norm());
@@ -64,14 +63,6 @@ bool Sightings::confirm(const KeptMap& map, const Sighting& sighting, bool joins
            say_the_same(map, other, sighting);
   });
   return num >= (joins ? kMinJoinSightings - 1 : 1);
-}
-
-void Sightings::renumber(std::span<const int> numbers) {
-  for (Sighting& sighting : sightings_) {
-    sighting.loop.from = numbers[slot(sighting.loop.from)];
-    sighting.loop.to = numbers[slot(sighting.loop.to)];
-  }
-  std::erase_if(sightings_, [](const Sighting& sighting) { return sighting.loop.to < 0; });
 }
 
 }  // namespace stemvo

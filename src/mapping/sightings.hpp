@@ -39,7 +39,13 @@ class Sightings {
   /// maps are to be joined.
   [[nodiscard]] bool confirm(const KeptMap& map, const Sighting& sighting, bool joins) const;
   /// As PlaceRecognizer::renumber().
-  void renumber(std::span<const int> numbers);
+  void renumber(std::span<const int> numbers) {
+    for (Sighting& sighting : sightings_) {
+      sighting.loop.from = numbers[slot(sighting.loop.from)];
+      sighting.loop.to = numbers[slot(sighting.loop.to)];
+    }
+    std::erase_if(sightings_, [](const Sighting& sighting) { return sighting.loop.to < 0; });
+  }
 
  private:
   [[nodiscard]] bool say_the_same(const KeptMap& map, const Sighting& a, const Sighting& b) const;

@@ -40,12 +40,6 @@ ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera, c
   }
 }
 
-FrameResult ChannelOdometry::process(Frame frame) {
-  track(std::move(frame));
-  localize();
-  return optimize();
-}
-
 Frame ChannelOdometry::prepare(const Channel& channel,
                                const cv::Mat& image,
                                double time_s,
@@ -146,11 +140,6 @@ FrameResult ChannelOdometry::optimize() {
   result.problem = work.frame.problem;
   optimized_ = std::move(work);
   return optimized_.localized.result;
-}
-
-const ChannelImage& ChannelOdometry::image() const {
-  static const ChannelImage no_image;
-  return optimized_.frame.pyramid != nullptr ? optimized_.frame.pyramid->channel : no_image;
 }
 
 }  // namespace stemvo

@@ -41,19 +41,25 @@ class ChannelOdometry {
 
   /// The last three for one frame; one without an image stands for a frame that could not be read:
   /// the last motion goes on.
-  FrameResult process(Frame frame);
+  FrameResult process(Frame frame) {
+    track(std::move(frame));
+    localize();
+    return optimize();
+  }
 
   /// As Estimator's.
   void load_map(KeptMap map) { estimator_->load_map(std::move(map)); }
 
-  [[nodiscard]] const Camera& given_camera() const { return given_camera_; }
   /// One per frame optimized.
   [[nodiscard]] const std::vector<double>& times_s() const { return times_s_; }
   /// It holds all frames optimized.
   [[nodiscard]] const Estimator& estimator() const { return *estimator_; }
 
   /// These belong to the last frame optimized; the image to the last one that had one.
-  [[nodiscard]] const ChannelImage& image() const;
+  [[nodiscard]] const ChannelImage& image() const {
+    static const ChannelImage no_image;
+    return optimized_.frame.pyramid != nullptr ? optimized_.frame.pyramid->channel : no_image;
+  }
   [[nodiscard]] const Matches& matches() const { return optimized_.frame.matches; }
   [[nodiscard]] const std::vector<char>& inlier_mask() const {
     return optimized_.localized.inlier_mask;

@@ -116,7 +116,7 @@ class Estimator {
   virtual void optimize(const Frame& frame, LocalizedFrame& localized) = 0;
 
   /// One pose per frame so far, world_from_camera, as they came.
-  [[nodiscard]] virtual const std::vector<Rigid3>& trajectory() const = 0;
+  [[nodiscard]] const std::vector<Rigid3>& trajectory() const { return trajectory_; }
   /// The camera as it was learnt, relative to the given one. nullopt: nothing is learnt.
   [[nodiscard]] virtual std::optional<CameraEstimate> camera_estimate() const {
     return std::nullopt;
@@ -130,6 +130,10 @@ class Estimator {
   virtual void load_map(KeptMap /*map*/) {}  // NOLINT: an override keeps it
   /// Numbers of the frames that are keyframes or were, in order.
   [[nodiscard]] virtual std::span<const int> keyframes() const { return {}; }
+
+ protected:
+  std::vector<Rigid3> trajectory_;
+  std::vector<double> times_s_;  ///< of the frames so far, the one in work among them
 };
 
 /// Length of a step that nothing measures: one unit where no scale is asked for. A drive's first

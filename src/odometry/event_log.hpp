@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "stemvo/frame_result.hpp"
 #include "stemvo/odometry.hpp"
 
@@ -14,7 +16,14 @@ class EventLog {
  public:
   void set(Log log) { log_ = std::move(log); }
   /// The next frame's.
-  void observe(const FrameResult& result);
+  void observe(const FrameResult& result) {
+    observe_state(result);
+    observe_scale(result);
+    if (!result.problem.empty() && result.problem != problem_) {
+      tell(LogLevel::kWarning, result, result.problem);
+    }
+    problem_ = result.problem;
+  }
   /// A new world begins.
   void restart() { *this = EventLog(std::move(log_)); }
 
@@ -22,9 +31,36 @@ class EventLog {
 
  private:
   explicit EventLog(Log log) : log_(std::move(log)) {}
-  void observe_state(const FrameResult& result);
-  void observe_scale(const FrameResult& result);
-  void tell(LogLevel level, const FrameResult& result, const std::string& text) const;
+  void observe_state(const FrameResult& result) {
+    if (result.state == FrameState::kLost && !is_lost_) {
+      is_lost_ = true;
+      tell(LogLevel::kWarning, result, "lost: the last motion is continued");
+    } else if (result.state == FrameState::kInitializing) {
+      has_map_ = false;
+    } else if (result.state == FrameState::kTracking && !(has_map_ && !is_lost_)) {
+      tell(LogLevel::kInfo, result,
+           has_map_   ? "recovered: localized in the map of before"
+           : is_lost_ ? "a new map was opened"
+                      : "a map was opened");
+      has_map_ = true;
+      is_lost_ = false;
+    }
+  }
+  void observe_scale(const FrameResult& result) {
+    const bool is_believed =
+        result.scale_state == ScaleState::kMeasured || result.scale_state == ScaleState::kHeld;
+    if (is_believed != is_scale_believed_) {
+      tell(is_believed ? LogLevel::kInfo : LogLevel::kWarning, result,
+           is_believed ? "the scale is believed: lengths are metres"
+                       : "the scale is doubted: lengths are a guess");
+    }
+    is_scale_believed_ = is_believed;
+  }
+  void tell(LogLevel level, const FrameResult& result, const std::string& text) const {
+    if (log_) {
+      log_(level, fmt::format("{:.3f} s: {}", result.time_s, text));
+    }
+  }
 
   Log log_;
   bool has_map_ = false;

@@ -44,8 +44,4 @@ cv::Mat FrameView::apply(const cv::Mat& image) const {
   return straight;
 }
 
-cv::Mat FrameView::apply_to_mask(const cv::Mat& mask) const {
-  return mask.empty() ? mask : cv::Mat(apply(mask != 0) == 255);
-}
-
 }  // namespace stemvo

@@ -23,7 +23,9 @@ class FrameView {
   /// threads may call it.
   [[nodiscard]] cv::Mat apply(const cv::Mat& image) const;
   /// The mask as the frames are: 255 where all of a pixel may be used, else 0.
-  [[nodiscard]] cv::Mat apply_to_mask(const cv::Mat& mask) const;
+  [[nodiscard]] cv::Mat apply_to_mask(const cv::Mat& mask) const {
+    return mask.empty() ? mask : cv::Mat(apply(mask != 0) == 255);
+  }
 
  private:
   cv::Size full_size_;

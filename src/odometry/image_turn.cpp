@@ -37,34 +37,15 @@ constexpr double kMinAhead = 0.2;  ///< beyond 78 degrees of turn: out of view
 
 using Level = ImageTurn::Level;
 
-/// Sums over pairs of gray values.
-class Correlation {
- public:
-  void add(double a, double b) {
-    ++num_;
-    sum_a_ += a;
-    sum_b_ += b;
-    sum_aa_ += a * a;
-    sum_bb_ += b * b;
-    sum_ab_ += a * b;
-  }
-  /// -1: fewer than `least` pairs, or a plain image.
-  [[nodiscard]] double value(double least) const {
-    const double variances =
-        (num_ * sum_aa_ - sum_a_ * sum_a_) * (num_ * sum_bb_ - sum_b_ * sum_b_);
-    return num_ >= least && variances > 0.0
-               ? (num_ * sum_ab_ - sum_a_ * sum_b_) / std::sqrt(variances)
-               : -1.0;
-  }
-
- private:
-  double num_ = 0.0;
-  double sum_a_ = 0.0;
-  double sum_b_ = 0.0;
-  double sum_aa_ = 0.0;
-  double sum_bb_ = 0.0;
-  double sum_ab_ = 0.0;
-};
+/// Normalized, of two arrays of gray values; -1 where one is plain.
+double correlation(const auto& a, const auto& b) {
+  const auto size = static_cast<decltype(a.sum())>(a.size());
+  const auto sum_a = a.sum();
+  const auto sum_b = b.sum();
+  const auto variances =
+      (a.square().sum() - sum_a * sum_a / size) * (b.square().sum() - sum_b * sum_b / size);
+  return variances > 0 ? ((a * b).sum() - sum_a * sum_b / size) / std::sqrt(variances) : -1.0;
+}
 
 /// Value and derivatives along x and y.
 using Sample = std::array<double, 3>;
@@ -129,11 +110,18 @@ Eigen::ArrayXXf centered(const Level& level) {
 }
 
 double likeness(const Level& prev, const Level& cur, const Eigen::Quaterniond& cur_from_prev) {
-  Correlation sums;
-  for_each_common(
-      prev, cur, cur_from_prev.toRotationMatrix(),
-      [&](float value, const Eigen::Vector2d&, const Sample& now) { sums.add(value, now[0]); });
-  return sums.value(kMinShared * num_seen(prev));
+  std::vector<double> values;
+  std::vector<double> now;
+  for_each_common(prev, cur, cur_from_prev.toRotationMatrix(),
+                  [&](float value, const Eigen::Vector2d&, const Sample& sampled) {
+                    values.push_back(value);
+                    now.push_back(sampled[0]);
+                  });
+  const auto size = std::ssize(values);
+  using Values = Eigen::Map<const Eigen::ArrayXd>;
+  return static_cast<double>(size) < kMinShared * num_seen(prev)
+             ? -1.0
+             : correlation(Values(values.data(), size), Values(now.data(), size));
 }
 
 /// Gauss-Newton from `turn`, cur_from_prev; gain and bias of the gray values are solved for, and
@@ -202,17 +190,11 @@ Eigen::Quaterniond best_shift(const Level& prev, const Level& cur) {
       const int rows = height - std::abs(dy);
       const auto a = before.block(std::max(0, -dy), std::max(0, -dx), rows, cols);
       const auto b = now.block(std::max(0, dy), std::max(0, dx), rows, cols);
-      const float size = static_cast<float>(rows * cols);
-      if (size < kMinShared * static_cast<float>(width * height)) {
+      if (rows * cols < kMinShared * width * height) {
         continue;
       }
-      const float sum_a = a.sum();
-      const float sum_b = b.sum();
-      const float variances =
-          (a.square().sum() - sum_a * sum_a / size) * (b.square().sum() - sum_b * sum_b / size);
-      const float common = (a * b).sum() - sum_a * sum_b / size;
-      if (variances > 0.0F && common / std::sqrt(variances) > best) {
-        best = common / std::sqrt(variances);
+      if (const double value = correlation(a, b); value > best) {
+        best = value;
         shift = {dx, dy};
       }
     }
@@ -224,33 +206,34 @@ Eigen::Quaterniond best_shift(const Level& prev, const Level& cur) {
 }  // namespace
 
 std::vector<Level> ImageTurn::small_levels(const ImagePyramid& image) const {
+  const auto halved = [](const cv::Mat& pixels) {
+    cv::Mat half;
+    cv::pyrDown(pixels, half);
+    return half;
+  };
   cv::Mat pixels = image.levels.front();
-  double scale = 1.0;
   for (const cv::Mat& level : image.levels) {
     if (level.cols >= kMinWidth_px) {
       pixels = level;
     }
   }
-  for (; pixels.cols >= 2 * kMinWidth_px;) {
-    cv::Mat half;
-    cv::pyrDown(pixels, half);
-    pixels = half;
+  while (pixels.cols >= 2 * kMinWidth_px) {
+    pixels = halved(pixels);
   }
-  scale = std::exp2(std::round(std::log2(static_cast<double>(image.channel.pixels.cols) /
-                                         static_cast<double>(pixels.cols))));
+  double scale = std::exp2(std::round(std::log2(static_cast<double>(image.channel.pixels.cols) /
+                                                static_cast<double>(pixels.cols))));
   std::vector<Level> levels;
   while (true) {
     const PixelMap map{scale * image.channel.map.scale, image.channel.map.offset_px};
     const cv::Mat mask = image.mask_of(map, pixels.size());
-    Level level;
-    level.pixels.resize(pixels.rows, pixels.cols);
-    for (int y = 0; y < pixels.rows; ++y) {
-      for (int x = 0; x < pixels.cols; ++x) {
-        level.pixels(y, x) = mask.empty() || mask.at<unsigned char>(y, x) != 0
-                                 ? pixels.at<unsigned char>(y, x)
-                                 : std::numeric_limits<float>::quiet_NaN();
-      }
+    cv::Mat values;
+    pixels.convertTo(values, CV_32F);
+    if (!mask.empty()) {
+      values.setTo(std::numeric_limits<float>::quiet_NaN(), mask == 0);
     }
+    Level level;
+    using Rows = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    level.pixels = Eigen::Map<const Rows>(values.ptr<float>(), values.rows, values.cols);
     level.focal_px = Eigen::Array2d(camera_.fx_px, camera_.fy_px) / map.scale.array();
     level.center_px =
         (Eigen::Array2d(camera_.cx_px, camera_.cy_px) - map.offset_px.array()) / map.scale.array();
@@ -258,9 +241,7 @@ std::vector<Level> ImageTurn::small_levels(const ImagePyramid& image) const {
     if (levels.back().pixels.size() <= kMaxCoarsest) {
       return levels;
     }
-    cv::Mat half;
-    cv::pyrDown(pixels, half);
-    pixels = half;
+    pixels = halved(pixels);
     scale *= 2.0;
   }
 }

@@ -9,7 +9,6 @@
 
 #include "geometry/pose_refinement.hpp"
 #include "geometry/two_view_models.hpp"
-#include "geometry/two_view_motion.hpp"
 #include "odometry/moving_things.hpp"
 
 namespace stemvo {
@@ -102,10 +101,6 @@ std::vector<char> flags_of(const Matches& matches,
 }
 
 }  // namespace
-
-Initializer::Initializer(const Options& config) : options_(config.two_view), two_view_(config) {}
-
-void Initializer::start(View reference) { reference_ = std::move(reference); }
 
 bool Initializer::lost_reference(const Observations& now) const {
   const auto living = static_cast<double>(common_points(reference_.points, now).size());

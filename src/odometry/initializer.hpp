@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "odometry/road/image.hpp"
 #include "odometry/tracks.hpp"
@@ -27,11 +28,11 @@ struct View {
 /// one, once there is parallax to decide (paper section 3.5-3.6).
 class Initializer {
  public:
-  explicit Initializer(const Options& config);
+  explicit Initializer(const Options& config) : options_(config.two_view), two_view_(config) {}
 
   /// The frame that the next ones are compared with. Without points: the matches of the next frame
   /// start there and say them.
-  void start(View reference);
+  void start(View reference) { reference_ = std::move(reference); }
   [[nodiscard]] const View& reference() const { return reference_; }
   /// Too few of its tracks live: it will not decide any more.
   [[nodiscard]] bool lost_reference(const Observations& now) const;

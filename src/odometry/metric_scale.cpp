@@ -20,11 +20,9 @@ MetricScale::MetricScale(const Options& config, std::optional<double> drift_sigm
   if (config.scale.source != ScaleSource::kCameraHeight) {
     return;
   }
-  RoadOptions options;
-  options.camera_height_m = config.scale.camera_height_m;
-  options.use_dense = config.scale.estimators != RoadEstimators::kPoints;
-  options.use_points = config.scale.estimators != RoadEstimators::kDense;
-  road_.emplace(options);
+  road_.emplace(RoadOptions{.camera_height_m = config.scale.camera_height_m,
+                            .use_dense = config.scale.estimators != RoadEstimators::kPoints,
+                            .use_points = config.scale.estimators != RoadEstimators::kDense});
 }
 
 void MetricScale::restart(const RoadImage* road, double time_s, bool has_scale) {
@@ -43,14 +41,6 @@ void MetricScale::restart(const RoadImage* road, double time_s, bool has_scale) 
     road_->restart();
     reason_ = road_->update(*road, {}, filter_).reason;
   }
-}
-
-void MetricScale::add(const std::vector<Way>& ways) {
-  ways_.add(ways);
-  if (!ways.empty() && !is_enabled()) {
-    state_ = ScaleState::kNone;
-  }
-  has_ways_ = has_ways_ || !ways.empty();
 }
 
 double MetricScale::measure(const RoadImage* road,
@@ -95,34 +85,6 @@ double MetricScale::measure(const RoadImage* road,
     road_->rescale(metres_per_unit);
   }
   return metres_per_unit;
-}
-
-void MetricScale::keep_last(std::string_view reason, double time_s) {
-  const double interval_s = time_s - std::exchange(last_time_s_, time_s);
-  if (is_enabled()) {
-    filter_.predict(interval_s);
-    state_ = state_ == ScaleState::kMeasured ? ScaleState::kHeld : state_;
-    reason_ = road_.has_value() ? reason : "";
-  }
-}
-
-void MetricScale::set_unknown(std::string_view reason) {
-  if (is_enabled()) {
-    state_ = ScaleState::kNone;
-    is_road_believed_ = false;
-    is_way_measured_ = false;
-    reason_ = road_.has_value() ? reason : "";
-  }
-}
-
-void MetricScale::report(FrameResult& result) const {
-  result.scale_state = state_;
-  result.road_reason = reason_;
-  if (is_enabled()) {
-    result.scale_sigma = is_way_measured_    ? filter_.sigma()
-                         : is_road_believed_ ? road_->sigma(filter_)
-                                             : ScaleFilter::kUnknownSigma;
-  }
 }
 
 std::vector<RoadLandmark> road_landmarks(const Window& window,

@@ -34,7 +34,13 @@ class MetricScale {
   /// scale.
   void restart(const RoadImage* road, double time_s, bool has_scale = false);
   /// Ways that came before this frame did.
-  void add(const std::vector<Way>& ways);
+  void add(const std::vector<Way>& ways) {
+    ways_.add(ways);
+    if (!ways.empty() && !is_enabled()) {
+      state_ = ScaleState::kNone;
+    }
+    has_ways_ = has_ways_ || !ways.empty();
+  }
   /// A frame whose image comes `cur_from_prev` (units) after the last one given here. Returns the
   /// factor that makes a unit a metre; the caller multiplies its lengths by it. `pixel_units`: as
   /// WayScale::move.
@@ -46,12 +52,34 @@ class MetricScale {
   /// The next motion will not tell how far the camera went since the last one.
   void cut_path(double time_s) { ways_.restart(time_s); }
   /// A frame on which nothing can be measured: the last scale is kept, its sigma grows.
-  void keep_last(std::string_view reason, double time_s);
+  void keep_last(std::string_view reason, double time_s) {
+    const double interval_s = time_s - std::exchange(last_time_s_, time_s);
+    if (is_enabled()) {
+      filter_.predict(interval_s);
+      state_ = state_ == ScaleState::kMeasured ? ScaleState::kHeld : state_;
+      reason_ = road_.has_value() ? reason : "";
+    }
+  }
   /// A frame without a map to scale.
-  void set_unknown(std::string_view reason);
+  void set_unknown(std::string_view reason) {
+    if (is_enabled()) {
+      state_ = ScaleState::kNone;
+      is_road_believed_ = false;
+      is_way_measured_ = false;
+      reason_ = road_.has_value() ? reason : "";
+    }
+  }
 
   /// State, reason and sigma of the last frame given.
-  void report(FrameResult& result) const;
+  void report(FrameResult& result) const {
+    result.scale_state = state_;
+    result.road_reason = reason_;
+    if (is_enabled()) {
+      result.scale_sigma = is_way_measured_    ? filter_.sigma()
+                           : is_road_believed_ ? road_->sigma(filter_)
+                                               : ScaleFilter::kUnknownSigma;
+    }
+  }
 
  private:
   ScaleFilter filter_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <map>
 #include <utility>
 
 #include <Eigen/LU>
@@ -95,22 +96,18 @@ void MotionCovariance::localized(const Window& window,
   const SeenLandmarks before = find_seen_landmarks(window, prev_points_);
   const PoseInfluences prev = influences_at(before, world_from_prev, camera, loss_px);
   const Matrix6d to_cur = adjoint(world_from_camera.inverse() * world_from_prev);
-  Matrix6d sum = Matrix6d::Zero();
-  std::size_t k = 0;
+  std::map<int, Vector6d> of_track;
   for (std::size_t i = 0; i < now.track_ids.size(); ++i) {
-    for (; k < before.track_ids.size() && before.track_ids[k] < now.track_ids[i]; ++k) {
-      sum += square(to_cur * prev.of_point[k]);
-    }
-    Vector6d influence = -influences_.of_point[i];
-    if (k < before.track_ids.size() && before.track_ids[k] == now.track_ids[i]) {
-      influence += to_cur * prev.of_point[k++];
-    }
-    sum += square(influence);
+    of_track[now.track_ids[i]] = -influences_.of_point[i];
   }
-  for (; k < before.track_ids.size(); ++k) {
-    sum += square(to_cur * prev.of_point[k]);
+  for (std::size_t i = 0; i < before.track_ids.size(); ++i) {
+    of_track.try_emplace(before.track_ids[i], Vector6d::Zero()).first->second +=
+        to_cur * prev.of_point[i];
   }
-  track_noise_ = sum;
+  track_noise_ = Matrix6d::Zero();
+  for (const auto& [track_id, influence] : of_track) {
+    *track_noise_ += square(influence);
+  }
 }
 
 void MotionCovariance::adjusted(const Window& window,

@@ -46,14 +46,6 @@ void Persistence::add(const Eigen::Vector3d& velocity, double interval_s) {
   recent_.push_back({0.0, velocity});
 }
 
-void Persistence::rescale(double factor) {
-  for (Sample& sample : recent_) {
-    sample.velocity *= factor;
-  }
-  common_ *= factor * factor;
-  square_ *= factor * factor;
-}
-
 double Persistence::share_after(double unmeasured_s) const {
   const double at = std::clamp((unmeasured_s - kBegins_s) / (kFades_s - kBegins_s), 0.0, 1.0);
   const double fresh = 0.5 * (1.0 + std::cos(at * std::numbers::pi));
@@ -113,12 +105,6 @@ MotionModel::Fused MotionModel::fuse(const Rigid3& measured,
   return fused;
 }
 
-void MotionModel::advance(double interval_s) {
-  Matrix12d step = Matrix12d::Identity();
-  step.topRightCorner<6, 6>().diagonal().setConstant(interval_s);
-  covariance_ = step * covariance_ * step.transpose();
-}
-
 /// The push is the rest of a prediction's error after its own and the measurement's.
 void MotionModel::learn(const Vector6d& off, const Matrix6d& noise, double interval_s) {
   const Vector6d expected = (covariance_.topLeftCorner<6, 6>() + noise).diagonal();
@@ -142,19 +128,6 @@ void MotionModel::measured(const Rigid3& prev_from_cur, double interval_s, bool 
   is_fused_ = is_fused;
   lasting_way_.add(velocity_.head<3>(), interval_s);
   lasting_turn_.add(velocity_.tail<3>(), interval_s);
-  unmeasured_s_ = 0.0;
-}
-
-void MotionModel::lost(double interval_s) {
-  unmeasured_s_ += interval_s;
-  is_fused_ = false;
-  lasting_way_.restart();
-  lasting_turn_.restart();
-}
-
-void MotionModel::restart() {
-  lost(0.0);
-  velocity_.setZero();
   unmeasured_s_ = 0.0;
 }
 

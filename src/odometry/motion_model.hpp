@@ -18,7 +18,13 @@ class Persistence {
  public:
   void add(const Eigen::Vector3d& velocity, double interval_s);
   void restart() { recent_.clear(); }
-  void rescale(double factor);
+  void rescale(double factor) {
+    for (Sample& sample : recent_) {
+      sample.velocity *= factor;
+    }
+    common_ *= factor * factor;
+    square_ *= factor * factor;
+  }
   /// The share that goes on so long after the last measurement; 1 at first.
   [[nodiscard]] double share_after(double unmeasured_s) const;
 
@@ -60,9 +66,18 @@ class MotionModel {
   /// The motion of a frame that was measured is final; `is_fused`: by fuse().
   void measured(const Rigid3& prev_from_cur, double interval_s, bool is_fused);
   /// No motion was measured: the prediction was taken.
-  void lost(double interval_s);
+  void lost(double interval_s) {
+    unmeasured_s_ += interval_s;
+    is_fused_ = false;
+    lasting_way_.restart();
+    lasting_turn_.restart();
+  }
   /// The next motion is not the one since the frame before.
-  void restart();
+  void restart() {
+    lost(0.0);
+    velocity_.setZero();
+    unmeasured_s_ = 0.0;
+  }
   /// Lengths were multiplied.
   void rescale(double factor);
   [[nodiscard]] double speed() const { return velocity_.head<3>().norm(); }
@@ -70,7 +85,11 @@ class MotionModel {
  private:
   using Matrix12d = Eigen::Matrix<double, 12, 12>;
   /// The prediction's error; pushes come on top.
-  void advance(double interval_s);
+  void advance(double interval_s) {
+    Matrix12d step = Matrix12d::Identity();
+    step.topRightCorner<6, 6>().diagonal().setConstant(interval_s);
+    covariance_ = step * covariance_ * step.transpose();
+  }
   void learn(const Vector6d& off, const Matrix6d& noise, double interval_s);
 
   Vector6d velocity_ = Vector6d::Zero();  ///< per second

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <functional>
+#include <iterator>
+#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -17,50 +19,32 @@ namespace {
 
 constexpr double kCellsInRow = 12.0;
 
-class CellCount {
- public:
-  CellCount(std::span<const Eigen::Vector2d> uv, const std::vector<char>& agrees) {
-    double least = 0.0;
-    double most = 0.0;
-    for (std::size_t i = 0; i < uv.size(); ++i) {
-      least = i == 0 ? uv[i].x() : std::min(least, uv[i].x());
-      most = i == 0 ? uv[i].x() : std::max(most, uv[i].x());
+/// The square cells of an image that show points.
+struct Cells {
+  Cells(std::span<const Eigen::Vector2d> uv, const std::vector<char>& agrees) {
+    double least = std::numeric_limits<double>::infinity();
+    double most = -least;
+    for (const Eigen::Vector2d& point : uv) {
+      least = std::min(least, point.x());
+      most = std::max(most, point.x());
     }
-    cell_px_ = std::max(1.0, (most - least) / kCellsInRow);
+    const double cell_px = std::max(1.0, (most - least) / kCellsInRow);
     for (std::size_t i = 0; i < uv.size(); ++i) {
-      Cell& cell = cells_[place_of(uv[i])];
+      Cell& cell =
+          all[{static_cast<int>(uv[i].x() / cell_px), static_cast<int>(uv[i].y() / cell_px)}];
       ++cell.num_points;
       cell.num_agreeing += agrees[i] != 0 ? 1 : 0;
+      of_point.push_back(&cell);
     }
   }
 
-  [[nodiscard]] double share_at(const Eigen::Vector2d& uv) const {
-    return share(cells_.at(place_of(uv)));
-  }
-  [[nodiscard]] double votes() const {
-    double sum = 0.0;
-    for (const auto& [place, cell] : cells_) {
-      sum += share(cell);
-    }
-    return sum;
-  }
-
- private:
   struct Cell {
     int num_points = 0;
     int num_agreeing = 0;
+    [[nodiscard]] double share() const { return static_cast<double>(num_agreeing) / num_points; }
   };
-  using Place = std::pair<int, int>;
-
-  static double share(const Cell& cell) {
-    return static_cast<double>(cell.num_agreeing) / cell.num_points;
-  }
-  [[nodiscard]] Place place_of(const Eigen::Vector2d& uv) const {
-    return {static_cast<int>(uv.x() / cell_px_), static_cast<int>(uv.y() / cell_px_)};
-  }
-
-  double cell_px_ = 1.0;
-  std::map<Place, Cell> cells_;
+  std::map<std::pair<int, int>, Cell> all;
+  std::vector<const Cell*> of_point;
 };
 
 /// A party of fewer of the image's cells is noise, or too small to mislead.
@@ -107,17 +91,18 @@ constexpr int kMostEvidence = 5;
 }  // namespace
 
 double cell_votes(std::span<const Eigen::Vector2d> uv, const std::vector<char>& agrees) {
-  return CellCount(uv, agrees).votes();
+  double votes = 0.0;
+  for (const auto& [place, cell] : Cells(uv, agrees).all) {
+    votes += cell.share();
+  }
+  return votes;
 }
 
 std::vector<double> cell_shares(std::span<const Eigen::Vector2d> uv,
                                 const std::vector<char>& agrees) {
-  const CellCount count(uv, agrees);
   std::vector<double> shares;
-  shares.reserve(uv.size());
-  for (const Eigen::Vector2d& point : uv) {
-    shares.push_back(count.share_at(point));
-  }
+  std::ranges::transform(Cells(uv, agrees).of_point, std::back_inserter(shares),
+                         [](const auto* cell) { return cell->share(); });
   return shares;
 }
 
@@ -207,19 +192,6 @@ void MovingTracks::observe(const Matches& matches, const std::vector<char>& fits
     if (evidence > 0) {
       evidence_.emplace(matches.track_ids[i], evidence);
     }
-  }
-}
-
-std::vector<char> MovingTracks::flags(const Matches& matches) const {
-  std::vector<char> mask(matches.track_ids.size());
-  std::transform(matches.track_ids.begin(), matches.track_ids.end(), mask.begin(),
-                 [&](int track_id) { return static_cast<char>(evidence_.contains(track_id)); });
-  return mask;
-}
-
-void MovingTracks::leave_out(const Matches& matches, std::vector<char>& mask) const {
-  for (std::size_t i = 0; i < mask.size(); ++i) {
-    mask[i] = evidence_.contains(matches.track_ids[i]) ? char{0} : mask[i];
   }
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -67,9 +69,19 @@ class MovingTracks {
 
   [[nodiscard]] bool empty() const { return evidence_.empty(); }
   /// One per match.
-  [[nodiscard]] std::vector<char> flags(const Matches& matches) const;
+  [[nodiscard]] std::vector<char> flags(const Matches& matches) const {
+    std::vector<char> mask(matches.track_ids.size());
+    std::ranges::transform(matches.track_ids, mask.begin(), [&](int track_id) {
+      return static_cast<char>(evidence_.contains(track_id));
+    });
+    return mask;
+  }
   /// Clears their flags in a mask, one per match.
-  void leave_out(const Matches& matches, std::vector<char>& mask) const;
+  void leave_out(const Matches& matches, std::vector<char>& mask) const {
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+      mask[i] = evidence_.contains(matches.track_ids[i]) ? char{0} : mask[i];
+    }
+  }
 
  private:
   TwoViewOptions options_;

@@ -22,7 +22,9 @@ namespace {
 /// Each holds a pose and a few numbers; a program that never asks for them shall hear of it.
 constexpr std::size_t kMaxWaiting = 1000;
 
-Error moved_from() { return fail("odometry: expected an object in use, found one moved from"); }
+Status check_in_use(const auto& impl) {
+  return impl ? Status() : fail("odometry: expected an object in use, found one moved from");
+}
 
 MapChanges landmarks_of(const ChannelOdometry& frames, int version) {
   const Estimator& estimator = frames.estimator();
@@ -196,17 +198,13 @@ void OdometryHandle::set_log(Log log) {
 }
 
 Status OdometryHandle::add_speed(double time_s, double metres_per_s, double sigma) {
-  if (impl_ == nullptr) {
-    return moved_from();
-  }
+  STEMVO_TRY(check_in_use(impl_));
   const std::lock_guard lock(impl_->ways_mutex);
   return impl_->ways.add_speed(time_s, metres_per_s, sigma);
 }
 
 Status OdometryHandle::add_distance(double from_s, double to_s, double metres, double sigma) {
-  if (impl_ == nullptr) {
-    return moved_from();
-  }
+  STEMVO_TRY(check_in_use(impl_));
   const std::lock_guard lock(impl_->ways_mutex);
   return impl_->ways.add_distance(from_s, to_s, metres, sigma);
 }
@@ -228,25 +226,19 @@ cv::Mat OdometryHandle::channel_image() const {
 }
 
 Expected<AdjustedMap> OdometryHandle::adjust_map(const std::vector<int>& covariance_of) const {
-  if (impl_ == nullptr) {
-    return moved_from();
-  }
+  STEMVO_TRY(check_in_use(impl_));
   STEMVO_TRY_GET(const WholeMap map, impl_->adjusted_map("adjust_map", covariance_of));
   return map.answer();
 }
 
 Status OdometryHandle::save_map(const std::filesystem::path& file) const {
-  if (impl_ == nullptr) {
-    return moved_from();
-  }
+  STEMVO_TRY(check_in_use(impl_));
   STEMVO_TRY_GET(const WholeMap map, impl_->adjusted_map(file.string(), {}));
   return impl_->odometry.save_map(file, map);
 }
 
 Status OdometryHandle::load_map(const std::filesystem::path& file) {
-  if (impl_ == nullptr) {
-    return moved_from();
-  }
+  STEMVO_TRY(check_in_use(impl_));
   const std::lock_guard lock(impl_->turn);
   STEMVO_TRY(impl_->check.check_none_admitted(file.string()));
   return impl_->odometry.load_map(file);
@@ -263,9 +255,7 @@ Expected<FrameResult> Odometry::process(const cv::Mat& image,
                                         PixelOrder order,
                                         double time_s,
                                         const FrameHints& hints) {
-  if (impl_ == nullptr) {
-    return moved_from();
-  }
+  STEMVO_TRY(check_in_use(impl_));
   const Status status = impl_->push(image, order, time_s, hints, true);
   if (impl_->loops.has_thrown()) {
     impl_->loops.finish();  // throws it
@@ -300,17 +290,13 @@ Status AsyncOdometry::push(const cv::Mat& image,
                            PixelOrder order,
                            double time_s,
                            const FrameHints& hints) {
-  if (impl_ == nullptr) {
-    return moved_from();
-  }
+  STEMVO_TRY(check_in_use(impl_));
   STEMVO_TRY(impl_->check_not_in_callback("push"));
   return impl_->push(image, order, time_s, hints, false);
 }
 
 Expected<std::optional<FrameResult>> AsyncOdometry::next() {
-  if (impl_ == nullptr) {
-    return moved_from();
-  }
+  STEMVO_TRY(check_in_use(impl_));
   if (impl_->callback) {
     return fail("next: expected results that wait, found a callback that took them");
   }
@@ -324,9 +310,7 @@ Expected<std::optional<FrameResult>> AsyncOdometry::next() {
 }
 
 Status AsyncOdometry::finish() {
-  if (impl_ == nullptr) {
-    return moved_from();
-  }
+  STEMVO_TRY(check_in_use(impl_));
   STEMVO_TRY(impl_->check_not_in_callback("finish"));
   const std::lock_guard lock(impl_->turn);
   impl_->loops.finish();
@@ -334,9 +318,7 @@ Status AsyncOdometry::finish() {
 }
 
 Status AsyncOdometry::reset() {
-  if (impl_ == nullptr) {
-    return moved_from();
-  }
+  STEMVO_TRY(check_in_use(impl_));
   STEMVO_TRY(impl_->check_not_in_callback("reset"));
   return impl_->reset();
 }

@@ -9,6 +9,7 @@
 #include <limits>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -41,7 +42,7 @@ class FrameLoops {
  public:
   /// std::system_error: no more threads are to be had.
   FrameLoops(FrameStages stages, int num_threads);
-  ~FrameLoops();
+  ~FrameLoops() { stop(nullptr); }
   FrameLoops(const FrameLoops&) = delete;
   FrameLoops& operator=(const FrameLoops&) = delete;
 
@@ -49,27 +50,93 @@ class FrameLoops {
   /// False: the run has ended. A frame whose fill() throws was never there.
   [[nodiscard]] bool push(const std::function<void(std::size_t)>& fill);
   /// Waits until all frames pushed are done. False: the run has ended.
-  [[nodiscard]] bool wait_for_all();
+  [[nodiscard]] bool wait_for_all() {
+    const std::size_t next = num_pushed_;
+    return wait(next, [&] { return num_optimized_ == next; });
+  }
   /// Waits until frame k is done, or there is none to wait for: the run has ended, or does without
   /// it. This one may be called beside the others.
-  bool wait_for(std::size_t k);
+  bool wait_for(std::size_t k) {
+    return wait(k, [&] { return k < num_optimized_; });
+  }
   /// Waits likewise, ends the run, and throws again what a stage threw.
-  void finish();
+  void finish() {
+    {
+      const std::lock_guard lock(mutex_);
+      num_frames_ = num_pushed_;
+      changed_.notify_all();
+    }
+    threads_.clear();
+    if (thrown_ != nullptr) {
+      std::rethrow_exception(thrown_);
+    }
+  }
   /// finish() throws.
-  [[nodiscard]] bool has_thrown() const;
+  [[nodiscard]] bool has_thrown() const {
+    const std::lock_guard lock(mutex_);
+    return thrown_ != nullptr;
+  }
 
  private:
-  void prepare();
-  void track_and_localize();
-  void optimize();
-  void take_through(std::size_t k);
+  void prepare() {
+    for (std::size_t k = 0; wait(k, [&] { return k < num_pushed_; }); ++k) {
+      stages_.prepare(k);
+      advance(num_prepared_);
+    }
+  }
+  void track_and_localize() {
+    for (std::size_t k = 0; wait(k, [&] { return k < num_prepared_; }); ++k) {
+      stages_.track(k);
+      if (wait(k, [&] { return k == num_optimized_; })) {
+        stages_.localize(k);
+        advance(num_localized_);
+      }
+    }
+  }
+  void optimize() {
+    for (std::size_t k = 0; wait(k, [&] { return k < num_localized_; }); ++k) {
+      if (!stages_.optimize(k)) {
+        stop(nullptr);
+      }
+      advance(num_optimized_);
+    }
+  }
+  void take_through(std::size_t k) {
+    stages_.prepare(k);
+    stages_.track(k);
+    stages_.localize(k);
+    if (!stages_.optimize(k)) {
+      stop(nullptr);
+    }
+    advance(num_optimized_);
+  }
 
   template <typename Work>
-  void guard(const Work& work);
+  void guard(const Work& work) {
+    try {
+      work();
+    } catch (...) {
+      stop(std::current_exception());
+    }
+  }
+  /// Until `may_go_on`; false: frame k is not to be done.
   template <typename Condition>
-  [[nodiscard]] bool wait(std::size_t k, const Condition& may_go_on);
-  void advance(std::size_t& count);
-  void stop(const std::exception_ptr& thrown);
+  [[nodiscard]] bool wait(std::size_t k, const Condition& may_go_on) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return is_stopped_ || k >= num_frames_ || may_go_on(); });
+    return !is_stopped_ && k < num_frames_;
+  }
+  void advance(std::size_t& count) {
+    const std::lock_guard lock(mutex_);
+    ++count;
+    changed_.notify_all();
+  }
+  void stop(const std::exception_ptr& thrown) {
+    const std::lock_guard lock(mutex_);
+    thrown_ = thrown_ == nullptr ? thrown : thrown_;
+    is_stopped_ = true;
+    changed_.notify_all();
+  }
 
   FrameStages stages_;
   // The loops wait for each other by counting frames; the mutex guards what follows.
@@ -103,15 +170,25 @@ class OdometryLoops {
   using Deliver = std::function<bool(const GivenFrame&, const FrameResult&)>;
 
   /// The odometry outlives this, and is used by nobody else meanwhile.
-  OdometryLoops(PhasedOdometry& odometry, Deliver deliver, int num_threads);
+  OdometryLoops(PhasedOdometry& odometry, Deliver deliver, int num_threads)
+      : odometry_(odometry), deliver_(std::move(deliver)), loops_(stages(), num_threads) {}
 
   /// The calls of FrameLoops. What `deliver` throws ends the run too.
-  [[nodiscard]] bool push(GivenFrame given);
+  [[nodiscard]] bool push(GivenFrame given) {
+    return loops_.push([&](std::size_t k) { slot(k).given = std::move(given); });
+  }
   void wait_for(std::size_t k) { loops_.wait_for(k); }
   void finish() { loops_.finish(); }
   [[nodiscard]] bool has_thrown() const { return loops_.has_thrown(); }
   /// Waits for all frames pushed, then PhasedOdometry::reset(). False: the run has ended before.
-  [[nodiscard]] bool reset();
+  [[nodiscard]] bool reset() {
+    if (!loops_.wait_for_all()) {
+      return false;
+    }
+    const std::lock_guard lock(state_);
+    odometry_.reset();
+    return true;
+  }
 
   /// The answer of `ask` about the odometry as it was left by some frame: in `deliver` by the one
   /// delivered.

@@ -45,17 +45,6 @@ bool MotionChain::passes_gate(const Eigen::Vector3d& direction_in_prev,
           motion.runner_up_ratio < kReverseRunnerUp);
 }
 
-void MotionChain::advance_to(double time_s, const std::optional<Eigen::Quaterniond>& turned) {
-  turned_ = turned;
-  if (std::isnan(time_s_)) {
-    image_time_s_ = time_s;
-  } else {
-    interval_s_ = time_s - time_s_;
-    assumed_speed_ = assumed_speed_ > 0.0 ? assumed_speed_ : assumed_step_ / interval_s_;
-  }
-  time_s_ = time_s;
-}
-
 FrameState MotionChain::add(const MeasuredMotion& motion, double length) {
   const Rigid3 prev_from_cur = motion.cur_from_prev.inverse();
   const Eigen::Vector3d direction = prev_from_cur.translation;
@@ -96,27 +85,6 @@ FrameState MotionChain::add(const MeasuredMotion& motion, double length) {
       break;
   }
   return state;
-}
-
-void MotionChain::apply(const Rigid3& prev_from_cur, double length) {
-  const Eigen::Vector3d step_in_prev = length * prev_from_cur.translation;
-  const Eigen::Vector3d position =
-      world_from_image_.translation + world_from_image_.rotation * step_in_prev;
-  const Eigen::Quaterniond rotation = options_.composition == Composition::kPaper
-                                          ? prev_from_cur.rotation * world_from_image_.rotation
-                                          : world_from_image_.rotation * prev_from_cur.rotation;
-  velocity_ = Velocity({prev_from_cur.rotation, step_in_prev}, since_image_s());
-  world_from_image_ = {rotation, position};
-  world_from_camera_ = world_from_image_;
-  image_time_s_ = time_s_;
-}
-
-void MotionChain::extrapolate(bool has_image) {
-  world_from_camera_ = world_from_camera_ * velocity_.motion(interval_s_, turned_);
-  if (has_image) {
-    world_from_image_ = world_from_camera_;
-    image_time_s_ = time_s_;
-  }
 }
 
 PairEstimator::PairEstimator(const Options& config, const Camera& camera)

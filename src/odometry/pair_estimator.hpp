@@ -24,13 +24,28 @@ class MotionChain {
 
   /// A frame's time, before it is given; the first one's is that of the pose at the origin.
   /// `turned`: its rotation since the frame before, for extrapolation; else that goes on.
-  void advance_to(double time_s, const std::optional<Eigen::Quaterniond>& turned = {});
+  void advance_to(double time_s, const std::optional<Eigen::Quaterniond>& turned = {}) {
+    turned_ = turned;
+    if (std::isnan(time_s_)) {
+      image_time_s_ = time_s;
+    } else {
+      interval_s_ = time_s - time_s_;
+      assumed_speed_ = assumed_speed_ > 0.0 ? assumed_speed_ : assumed_step_ / interval_s_;
+    }
+    time_s_ = time_s;
+  }
   /// A measured motion from the last image to this one, and its length where it is known (0: it is
   /// not). Returns the state after the gate.
   FrameState add(const MeasuredMotion& motion, double length = 0.0);
   /// A frame without an image, or without a motion: the last motion goes on. With an image the next
   /// motion starts here, without one it starts at the last image.
-  void extrapolate(bool has_image);
+  void extrapolate(bool has_image) {
+    world_from_camera_ = world_from_camera_ * velocity_.motion(interval_s_, turned_);
+    if (has_image) {
+      world_from_image_ = world_from_camera_;
+      image_time_s_ = time_s_;
+    }
+  }
   /// The next motion starts at an earlier image.
   void go_back(const Rigid3& world_from_image, double image_time_s) {
     world_from_image_ = world_from_image;
@@ -48,7 +63,18 @@ class MotionChain {
  private:
   [[nodiscard]] bool passes_gate(const Eigen::Vector3d& direction_in_prev,
                                  const MeasuredMotion& motion) const;
-  void apply(const Rigid3& prev_from_cur, double length);
+  void apply(const Rigid3& prev_from_cur, double length) {
+    const Eigen::Vector3d step_in_prev = length * prev_from_cur.translation;
+    const Eigen::Vector3d position =
+        world_from_image_.translation + world_from_image_.rotation * step_in_prev;
+    const Eigen::Quaterniond rotation = options_.composition == Composition::kPaper
+                                            ? prev_from_cur.rotation * world_from_image_.rotation
+                                            : world_from_image_.rotation * prev_from_cur.rotation;
+    velocity_ = Velocity({prev_from_cur.rotation, step_in_prev}, since_image_s());
+    world_from_image_ = {rotation, position};
+    world_from_camera_ = world_from_image_;
+    image_time_s_ = time_s_;
+  }
 
   OdometryOptions options_;
   double assumed_step_;  ///< metres or units, in the first interval
@@ -72,8 +98,6 @@ class PairEstimator final : public Estimator {
   [[nodiscard]] LocalizedFrame localize(const Frame& frame) override;
   void optimize(const Frame& frame, LocalizedFrame& localized) override;
 
-  [[nodiscard]] const std::vector<Rigid3>& trajectory() const override { return trajectory_; }
-
  private:
   [[nodiscard]] double measure_length(const Frame& frame);
 
@@ -87,8 +111,6 @@ class PairEstimator final : public Estimator {
   double last_speed_ = 0.0;  ///< of the last frame that was tracked: its unit; 0: none yet
   int last_image_ = -1;      ///< number of the last frame that had one
   MeasuredMotion motion_;    ///< of the frame in work
-  std::vector<Rigid3> trajectory_;
-  std::vector<double> times_s_;  ///< of its frames
 };
 
 }  // namespace stemvo

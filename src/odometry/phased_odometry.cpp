@@ -20,12 +20,9 @@ namespace stemvo {
 Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
                                                 const Options& given,
                                                 const cv::Mat& mask) {
-  Status status = check_camera(camera);
-  status = status ? validate(given) : status;
-  status = status ? check_mask(mask, camera) : status;
-  if (!status) {
-    return status.error();
-  }
+  STEMVO_TRY(check_camera(camera));
+  STEMVO_TRY(validate(given));
+  STEMVO_TRY(check_mask(mask, camera));
   Options options = given;
   options.threads = options.threads > 0 ? options.threads : cv::getNumberOfCPUs();
   const Expected<FrameView> view = FrameView::create(camera);
@@ -77,12 +74,6 @@ Status PhasedOdometry::check_remembers(const std::string& asked) const {
              ? Status()
              : fail(fmt::format("{}: expected odometry.mode map with odometry.loops true, found {}",
                                 asked, is_map ? "loops false" : "mode two_frame"));
-}
-
-std::string PhasedOdometry::channel_name() const {
-  const StemInfo& info = stem_.info();
-  return fmt::format("{}, filter {}, sampled every {} px", info.model, info.filter,
-                     info.sampling_px);
 }
 
 Status PhasedOdometry::save_map(const std::filesystem::path& file, const WholeMap& map) const {

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
 #include <opencv2/core.hpp>
 
 #include "odometry/channel_odometry.hpp"
@@ -60,7 +61,11 @@ class PhasedOdometry {
 
  private:
   /// The channel that descriptors are made on.
-  [[nodiscard]] std::string channel_name() const;
+  [[nodiscard]] std::string channel_name() const {
+    const StemInfo& info = stem_.info();
+    return fmt::format("{}, filter {}, sampled every {} px", info.model, info.filter,
+                       info.sampling_px);
+  }
 
   PhasedOdometry(
       const Options& options, const FrameView& view, const cv::Mat& mask, Stem stem, int zoom);

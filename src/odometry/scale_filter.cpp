@@ -104,13 +104,4 @@ double ScaleFilter::judge(double innovation, double sigma, ScaleWitness witness)
   return std::abs(innovation) / std::hypot(sigma, sigma_);
 }
 
-std::optional<double> ScaleFilter::innovation(double log_scale, double sigma) const {
-  if (!is_initialized_) {
-    return std::nullopt;
-  }
-  return (log_scale - log_scale_) / std::hypot(sigma, sigma_);
-}
-
-void ScaleFilter::restart() { *this = ScaleFilter(drift_sigma_, joins_frames_); }
-
 }  // namespace stemvo

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 
@@ -37,9 +38,14 @@ class ScaleFilter {
   /// road: if it were measured ten times a second.
   bool update(double log_scale, double sigma, ScaleWitness witness);
   /// The measurement's distance from the state, standard deviations; nullopt where there is none.
-  [[nodiscard]] std::optional<double> innovation(double log_scale, double sigma) const;
+  [[nodiscard]] std::optional<double> innovation(double log_scale, double sigma) const {
+    if (!is_initialized_) {
+      return std::nullopt;
+    }
+    return (log_scale - log_scale_) / std::hypot(sigma, sigma_);
+  }
   void shift(double log_factor) { log_scale_ += log_factor; }
-  void restart();
+  void restart() { *this = ScaleFilter(drift_sigma_, joins_frames_); }
 
   [[nodiscard]] bool is_initialized() const { return is_initialized_; }
   [[nodiscard]] double log_scale() const { return log_scale_; }

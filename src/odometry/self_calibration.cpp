@@ -68,35 +68,10 @@ SelfCalibration::SelfCalibration(const Camera& given,
   information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
-std::optional<CameraEstimate> SelfCalibration::estimate() const {
-  if (refinement_ == CameraRefinement::kOff) {
-    return std::nullopt;
-  }
-  SelfCalibration after = *this;
-  after.fuse_result();
-  return CameraEstimate{after.mean_, after.sigma(), after.num_runs_};
-}
-
-std::optional<CameraSigma> SelfCalibration::camera_sigma() const {
-  if (refinement_ == CameraRefinement::kOff) {
-    return std::nullopt;
-  }
-  const IntrinsicsDelta sigmas = sigma();
-  return CameraSigma{sigmas[2] * given_.fx_px, sigmas[0], sigmas[1]};
-}
-
 IntrinsicsDelta SelfCalibration::sigma() const {
   IntrinsicsDelta sigma = information_.inverse().diagonal().cwiseSqrt();
   sigma[2] *= kFocalSigmaFactor;
   return sigma;
-}
-
-IntrinsicsDelta SelfCalibration::applied() const {
-  IntrinsicsDelta change = IntrinsicsDelta::Zero();
-  change[0] = camera_.cx_px - given_.cx_px;
-  change[1] = camera_.cy_px - given_.cy_px;
-  change[2] = camera_.fx_px / given_.fx_px - 1.0;
-  return change;
 }
 
 void SelfCalibration::observe(const Keyframe& keyframe, const BundleOptions& options) {

@@ -7,7 +7,6 @@
 #include <Eigen/Core>
 
 #include "geometry/bundle.hpp"
-#include "odometry/bundle_adjustment.hpp"
 #include "odometry/window.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/frame_result.hpp"
@@ -44,9 +43,22 @@ class SelfCalibration {
   [[nodiscard]] const Camera& camera() const { return camera_; }
   /// The estimate of all runs, whether it is significant or not, after one that is still measured;
   /// nullopt: nothing is refined.
-  [[nodiscard]] std::optional<CameraEstimate> estimate() const;
+  [[nodiscard]] std::optional<CameraEstimate> estimate() const {
+    if (refinement_ == CameraRefinement::kOff) {
+      return std::nullopt;
+    }
+    SelfCalibration after = *this;
+    after.fuse_result();
+    return CameraEstimate{after.mean_, after.sigma(), after.num_runs_};
+  }
   /// Standard deviations after the runs fused so far; nullopt: nothing is refined.
-  [[nodiscard]] std::optional<CameraSigma> camera_sigma() const;
+  [[nodiscard]] std::optional<CameraSigma> camera_sigma() const {
+    if (refinement_ == CameraRefinement::kOff) {
+      return std::nullopt;
+    }
+    const IntrinsicsDelta sigmas = sigma();
+    return CameraSigma{sigmas[2] * given_.fx_px, sigmas[0], sigmas[1]};
+  }
 
  private:
   using Measured = std::shared_future<std::optional<CameraMeasurement>>;
@@ -55,7 +67,13 @@ class SelfCalibration {
   /// The run that is measured, if there is one; waits for it.
   void fuse_result();
   void approach_target();
-  [[nodiscard]] IntrinsicsDelta applied() const;
+  [[nodiscard]] IntrinsicsDelta applied() const {
+    IntrinsicsDelta change = IntrinsicsDelta::Zero();
+    change[0] = camera_.cx_px - given_.cx_px;
+    change[1] = camera_.cy_px - given_.cy_px;
+    change[2] = camera_.fx_px / given_.fx_px - 1.0;
+    return change;
+  }
   /// Standard deviations of mean_.
   [[nodiscard]] IntrinsicsDelta sigma() const;
 

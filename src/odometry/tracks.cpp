@@ -34,17 +34,20 @@ Observations kept_points(const std::vector<int>& track_ids,
   return points;
 }
 
+/// One of each match: length_of(prev_uv, cur_uv).
+std::vector<double> lengths_of(const PixelPairs& pairs, const auto& length_of) {
+  std::vector<double> lengths(pairs.size());
+  std::ranges::transform(pairs.prev_uv, pairs.cur_uv, lengths.begin(), length_of);
+  return lengths;
+}
+
 /// The flow of each match that the rotation does not explain.
 std::vector<double> parallaxes_px(const Eigen::Quaterniond& rotation,
                                   const PixelPairs& pairs,
                                   const Camera& camera) {
-  std::vector<double> lengths;
-  lengths.reserve(pairs.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const Eigen::Vector3d ray = rotation * camera.normalize(pairs.prev_uv[i]).homogeneous();
-    lengths.push_back((pairs.cur_uv[i] - camera.project(ray)).norm());
-  }
-  return lengths;
+  return lengths_of(pairs, [&](const Eigen::Vector2d& prev, const Eigen::Vector2d& cur) {
+    return (cur - camera.project(rotation * camera.normalize(prev).homogeneous())).norm();
+  });
 }
 
 Eigen::Matrix3d fundamental_of(const Rigid3& cur_from_prev, const Camera& camera) {
@@ -98,12 +101,8 @@ PointPairs common_points(const Observations& prev, const Observations& cur) {
 }
 
 double median_flow_px(const PixelPairs& pairs) {
-  std::vector<double> lengths;
-  lengths.reserve(pairs.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    lengths.push_back((pairs.cur_uv[i] - pairs.prev_uv[i]).norm());
-  }
-  return median(std::move(lengths));
+  return median(
+      lengths_of(pairs, [](const auto& prev, const auto& cur) { return (cur - prev).norm(); }));
 }
 
 bool is_stationary(const Observations& before,
@@ -143,16 +142,12 @@ double median_epipolar_px(const Rigid3& cur_from_prev,
     return 0.0;
   }
   const Eigen::Matrix3d fundamental = fundamental_of(cur_from_prev, camera);
-  std::vector<double> distances;
-  distances.reserve(pairs.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const Eigen::Vector3d cur = pairs.cur_uv[i].homogeneous();
-    const Eigen::Vector3d line_in_cur = fundamental * pairs.prev_uv[i].homogeneous();
-    const Eigen::Vector3d line_in_prev = fundamental.transpose() * cur;
+  return median(lengths_of(pairs, [&](const Eigen::Vector2d& prev, const Eigen::Vector2d& cur) {
+    const Eigen::Vector3d line_in_cur = fundamental * prev.homogeneous();
+    const Eigen::Vector3d line_in_prev = fundamental.transpose() * cur.homogeneous();
     const double gradient = std::hypot(line_in_cur.head<2>().norm(), line_in_prev.head<2>().norm());
-    distances.push_back(std::abs(cur.dot(line_in_cur)) / gradient);
-  }
-  return median(std::move(distances));
+    return std::abs(cur.homogeneous().dot(line_in_cur)) / gradient;
+  }));
 }
 
 std::vector<char> epipolar_inliers(const Rigid3& cur_from_prev,

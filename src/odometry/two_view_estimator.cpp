@@ -8,12 +8,12 @@
 
 #include "geometry/pose_refinement.hpp"
 #include "geometry/two_view_models.hpp"
-#include "geometry/two_view_motion.hpp"
 #include "odometry/check_frame.hpp"
 #include "odometry/robust_models.hpp"
 #include "odometry/tracks.hpp"
 #include "stemvo/two_view.hpp"
 #include "timing/stage_timer.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -175,12 +175,9 @@ Expected<TwoViewResult> estimate_two_view(std::span<const Eigen::Vector2d> prev_
                                           std::span<const Eigen::Vector2d> cur_uv,
                                           const Camera& camera,
                                           const Options& options) {
-  Status status = check_camera(camera);
-  status = status ? validate(options) : status;
-  status = status ? check_matches(prev_uv, cur_uv) : status;
-  if (!status) {
-    return status.error();
-  }
+  STEMVO_TRY(check_camera(camera));
+  STEMVO_TRY(validate(options));
+  STEMVO_TRY(check_matches(prev_uv, cur_uv));
   MeasuredMotion motion =
       TwoViewEstimator(options).measure({prev_uv, cur_uv}, camera, /*is_initializing=*/true);
   return TwoViewResult{motion.state,

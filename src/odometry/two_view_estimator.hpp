@@ -26,7 +26,6 @@ struct MeasuredMotion {
   double homography_score = 0.0;   ///< S_H
   double fundamental_score = 0.0;  ///< S_F
   double homography_ratio = 0.0;   ///< R_H
-  double step = 0.0;               ///< length of the translation where it is known; 0: it is not
   double parallax_px = 0.0;        ///< median flow that no rotation explains
   bool is_decisive = false;        ///< enough points, parallax, and no close second hypothesis
   double runner_up_ratio = 1.0;    ///< of the hypothesis test; near 1: a guess

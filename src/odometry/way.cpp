@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "odometry/frame_clock.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -57,15 +58,11 @@ constexpr double kMinWaySigmas = 3.0;
 }  // namespace
 
 Status WayInput::add_speed(double time_s, double metres_per_s, double sigma) {
-  Status status = check_source(source_);
-  status =
-      status ? check_time("speed", time_s, last_speed_ ? last_speed_->time_s : kNever_s) : status;
-  status = status ? check_sigma("speed", sigma) : status;
-  if (status && !std::isfinite(metres_per_s)) {
-    status = fail(fmt::format("speed: expected a number of m/s, found {}", metres_per_s));
-  }
-  if (!status) {
-    return status;
+  STEMVO_TRY(check_source(source_));
+  STEMVO_TRY(check_time("speed", time_s, last_speed_ ? last_speed_->time_s : kNever_s));
+  STEMVO_TRY(check_sigma("speed", sigma));
+  if (!std::isfinite(metres_per_s)) {
+    return fail(fmt::format("speed: expected a number of m/s, found {}", metres_per_s));
   }
   const Speed now{time_s, std::abs(metres_per_s), sigma};
   if (last_speed_ && time_s - last_speed_->time_s <= kMaxGap_s) {
@@ -82,22 +79,20 @@ Status WayInput::add_speed(double time_s, double metres_per_s, double sigma) {
 }
 
 Status WayInput::add_distance(double from_s, double to_s, double metres, double sigma) {
-  Status status = check_source(source_);
-  status = status ? check_time("distance", from_s, kNever_s) : status;
-  status = status ? check_time("distance", to_s, last_to_s_) : status;
-  status = status ? check_sigma("distance", sigma) : status;
-  if (status && !(from_s < to_s)) {
-    status = fail(fmt::format("distance: expected a time after its beginning, {} s, found {} s",
-                              from_s, to_s));
+  STEMVO_TRY(check_source(source_));
+  STEMVO_TRY(check_time("distance", from_s, kNever_s));
+  STEMVO_TRY(check_time("distance", to_s, last_to_s_));
+  STEMVO_TRY(check_sigma("distance", sigma));
+  if (!(from_s < to_s)) {
+    return fail(fmt::format("distance: expected a time after its beginning, {} s, found {} s",
+                            from_s, to_s));
   }
-  if (status && !(metres >= 0.0 && std::isfinite(metres))) {
-    status = fail(fmt::format("distance: expected at least 0 m, found {}", metres));
+  if (!(metres >= 0.0 && std::isfinite(metres))) {
+    return fail(fmt::format("distance: expected at least 0 m, found {}", metres));
   }
-  if (status) {
-    last_to_s_ = to_s;
-    ways_.push_back({from_s, to_s, metres, sigma, Way::Kind::kDistance});
-  }
-  return status;
+  last_to_s_ = to_s;
+  ways_.push_back({from_s, to_s, metres, sigma, Way::Kind::kDistance});
+  return {};
 }
 
 std::vector<Way> WayInput::take(double time_s) {
@@ -108,14 +103,6 @@ std::vector<Way> WayInput::take(double time_s) {
                     held_s * last_speed_->sigma, Way::Kind::kHeld});
   }
   return ways;
-}
-
-void WayScale::restart(double time_s) {
-  stations_ = {{time_s, 0.0}};
-  now_from_station_ = {};
-  for (Queue& queue : queues_) {
-    queue.joined.reset();
-  }
 }
 
 void WayScale::move(const Rigid3& cur_from_prev, double time_s, double pixel_units) {
@@ -135,38 +122,6 @@ void WayScale::move(const Rigid3& cur_from_prev, double time_s, double pixel_uni
   while (stations_.front().time_s < time_s - kMemory_s) {
     stations_.pop_front();
   }
-}
-
-void WayScale::rescale(double factor) {
-  for (Station& station : stations_) {
-    station.length *= factor;
-  }
-  now_from_station_.translation *= factor;
-}
-
-void WayScale::add(const std::vector<Way>& ways) {
-  held_.reset();
-  for (const Way& way : ways) {
-    if (way.kind == Way::Kind::kHeld) {
-      held_ = way;
-    } else {
-      queues_[static_cast<std::size_t>(way.kind)].waiting.push_back(way);
-    }
-  }
-}
-
-double WayScale::length_at(double time_s) const {
-  const auto after = std::ranges::lower_bound(stations_, time_s, {}, &Station::time_s);
-  if (after == stations_.begin() || after == stations_.end()) {
-    return after == stations_.end() ? stations_.back().length : after->length;
-  }
-  const Station& before = *std::prev(after);
-  const double share = (time_s - before.time_s) / (after->time_s - before.time_s);
-  return before.length + share * (after->length - before.length);
-}
-
-bool WayScale::covers(const Way& way) const {
-  return way.from_s >= stations_.front().time_s && way.to_s <= stations_.back().time_s;
 }
 
 void WayScale::join_ended(Queue& queue) const {

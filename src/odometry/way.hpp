@@ -58,13 +58,33 @@ class WayInput {
 class WayScale {
  public:
   /// The path begins here: nothing connects it with the one before.
-  void restart(double time_s);
+  void restart(double time_s) {
+    stations_ = {{time_s, 0.0}};
+    now_from_station_ = {};
+    for (Queue& queue : queues_) {
+      queue.joined.reset();
+    }
+  }
   /// `cur_from_prev`: the motion since the last call, in units; `pixel_units`: one that moves what
   /// is seen by a pixel.
   void move(const Rigid3& cur_from_prev, double time_s, double pixel_units);
   /// The map was multiplied by `factor` (new units = factor * old units).
-  void rescale(double factor);
-  void add(const std::vector<Way>& ways);
+  void rescale(double factor) {
+    for (Station& station : stations_) {
+      station.length *= factor;
+    }
+    now_from_station_.translation *= factor;
+  }
+  void add(const std::vector<Way>& ways) {
+    held_.reset();
+    for (const Way& way : ways) {
+      if (way.kind == Way::Kind::kHeld) {
+        held_ = way;
+      } else {
+        queues_[static_cast<std::size_t>(way.kind)].waiting.push_back(way);
+      }
+    }
+  }
   /// Gives the filter what the ways that have ended tell. Returns whether one of them was believed.
   bool measure(ScaleFilter& filter);
 
@@ -79,8 +99,18 @@ class WayScale {
     std::deque<Way> waiting;
     std::optional<Way> joined;  ///< those that have ended, as long as they were too short
   };
-  [[nodiscard]] double length_at(double time_s) const;
-  [[nodiscard]] bool covers(const Way& way) const;
+  [[nodiscard]] double length_at(double time_s) const {
+    const auto after = std::ranges::lower_bound(stations_, time_s, {}, &Station::time_s);
+    if (after == stations_.begin() || after == stations_.end()) {
+      return after == stations_.end() ? stations_.back().length : after->length;
+    }
+    const Station& before = *std::prev(after);
+    const double share = (time_s - before.time_s) / (after->time_s - before.time_s);
+    return before.length + share * (after->length - before.length);
+  }
+  [[nodiscard]] bool covers(const Way& way) const {
+    return way.from_s >= stations_.front().time_s && way.to_s <= stations_.back().time_s;
+  }
   void join_ended(Queue& queue) const;
   [[nodiscard]] bool measure(Queue& queue, ScaleFilter& filter) const;
   /// By ways, or parts of ways, that are inside the path.

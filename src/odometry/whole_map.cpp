@@ -14,8 +14,6 @@
 namespace stemvo {
 namespace {
 
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
 Rigid3 pose_of(const Similarity3& placed) { return {placed.rotation, placed.translation}; }
 
 /// Places that are seen again, from elsewhere, tell a camera that nobody knows: focal length
@@ -28,8 +26,8 @@ bool agrees_with_motions(const KeptMap& kept, const std::vector<Similarity3>& ma
   constexpr double kMaxTurn_rad = 0.035;
   constexpr double kMaxSigmas = 10.0;
   return std::ranges::all_of(kept.motions, [&](const MapEdge& edge) {
-    const Eigen::Quaterniond turn = map_from_keyframe[index(edge.from)].rotation.conjugate() *
-                                    map_from_keyframe[index(edge.to)].rotation;
+    const Eigen::Quaterniond turn = map_from_keyframe[slot(edge.from)].rotation.conjugate() *
+                                    map_from_keyframe[slot(edge.to)].rotation;
     return turn.angularDistance(edge.from_to.rotation) <
            std::max(kMaxTurn_rad, kMaxSigmas * edge.sigma_rad);
   });
@@ -92,9 +90,9 @@ void WholeMap::take_in(const MapAdjustment& adjusted) {
   for (const AdjustedLandmark& landmark : adjusted.landmarks) {
     for (const MapView& view : landmark.views) {
       const Eigen::Vector3d in_camera =
-          kept.map_from_keyframe[index(view.keyframe)].inverse() * landmark.in_map;
+          kept.map_from_keyframe[slot(view.keyframe)].inverse() * landmark.in_map;
       if (in_camera.allFinite() && in_camera.z() > 0.0) {
-        kept.keyframes[index(view.keyframe)].corners[index(view.corner)].in_camera =
+        kept.keyframes[slot(view.keyframe)].corners[slot(view.corner)].in_camera =
             in_camera.cast<float>();
       }
     }
@@ -124,17 +122,17 @@ AdjustedMap WholeMap::answer() const {
     const KeptKeyframe& keyframe = kept.keyframes[i];
     const bool is_own = keyframe.frame >= 0;  // another recording's clock is its own
     map.keyframes.push_back({keyframe.frame,
-                             is_own ? times_s[index(keyframe.frame)] : keyframe.time_s,
+                             is_own ? times_s[slot(keyframe.frame)] : keyframe.time_s,
                              pose_of(kept.map_from_keyframe[i])});
   }
   for (std::size_t i = 0; i < covariance_of.size(); ++i) {
     if (covariances[i].trace() > 0.0) {  // else it could not be found
-      map.keyframes[index(covariance_of[i])].covariance = covariances[i];
+      map.keyframes[slot(covariance_of[i])].covariance = covariances[i];
     }
   }
   for (const KeptLandmark& landmark : landmarks) {
     map.landmarks.push_back(
-        {landmark.id, map_from_frame[index(landmark.frame)] * landmark.in_camera.cast<double>(),
+        {landmark.id, map_from_frame[slot(landmark.frame)] * landmark.in_camera.cast<double>(),
          landmark.rgb});
   }
   for (const auto& [from, to] : frames_of_loops(kept)) {

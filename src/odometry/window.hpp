@@ -4,12 +4,14 @@
 #include <cstddef>
 #include <deque>
 #include <map>
+#include <optional>
 #include <set>
 #include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "geometry/bundle.hpp"
 #include "odometry/tracks.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/rigid3.hpp"
@@ -49,9 +51,25 @@ struct KeyframeObservation {
 /// are walked over once.
 class ObservationWalk {
  public:
-  explicit ObservationWalk(const Window& window);
+  explicit ObservationWalk(const Window& window) : window_(window) {
+    for (const Keyframe& keyframe : window.keyframes) {
+      next_.push_back(keyframe.points.begin());
+    }
+  }
   /// Oldest keyframe first; valid until the next call, whose id is higher.
-  [[nodiscard]] std::span<const KeyframeObservation> seek(int track_id);
+  [[nodiscard]] std::span<const KeyframeObservation> seek(int track_id) {
+    found_.clear();
+    for (std::size_t i = 0; i < next_.size(); ++i) {
+      const Observations& points = window_.keyframes[i].points;
+      while (next_[i] != points.end() && next_[i]->track_id < track_id) {
+        ++next_[i];
+      }
+      if (next_[i] != points.end() && next_[i]->track_id == track_id) {
+        found_.push_back({i, next_[i]->uv});
+      }
+    }
+    return found_;
+  }
 
  private:
   const Window& window_;
@@ -71,6 +89,11 @@ class ObservationWalk {
   const Eigen::Vector3d point = camera_from_world * point_in_world;
   return point.z() > 0.0 && (camera.project(point) - uv).norm() <= bound_px;
 }
+
+/// The angle under which a point sees two cameras.
+[[nodiscard]] double parallax_rad(const Eigen::Vector3d& point_in_world,
+                                  const Rigid3& world_from_a,
+                                  const Rigid3& world_from_b);
 
 /// The keyframe that leaves a full window for the one that comes: the oldest once the two share too
 /// few tracks to hold each other, else the one that adds the least between its neighbours. So the
@@ -108,5 +131,23 @@ void move(Window& window, const Similarity3& moved);
 
 /// Multiplies every length; `center` (in the world) stays where it is.
 void rescale(Window& window, double factor, const Eigen::Vector3d& center);
+
+/// Sliding-window bundle adjustment: poses of the window and its landmarks, robust reprojection
+/// error, Schur complement over the landmarks. Two fixed keyframes (the oldest ones) hold the
+/// gauge, scale included; with one the length of the window is kept, from the oldest keyframe to
+/// the last but one. The loss scale is the options' or twice the median error, whichever is larger.
+/// One thread: the same bytes on every run. False: too little to do, or not solved; the window is
+/// unchanged.
+bool refine_window(Window& window, const Camera& camera, const BundleOptions& options);
+
+/// The camera as a window tells it, all else left free.
+struct CameraMeasurement {
+  IntrinsicsDelta change;         ///< of `camera`
+  CameraInformation information;  ///< of it alone, without the prior
+};
+[[nodiscard]] std::optional<CameraMeasurement> measure_camera(const Window& window,
+                                                              const Camera& camera,
+                                                              const CameraPrior& prior,
+                                                              const BundleOptions& options);
 
 }  // namespace stemvo

@@ -27,6 +27,8 @@ constexpr double kMinExplained = 0.5;
 constexpr double kHysteresis = 1.5;
 /// So many times the flow of a stationary frame is what errors of landmarks do to one that turns.
 constexpr double kTurnFlow = 3.0;
+/// A track this near moves as the world does, where a thing is the other choice.
+constexpr double kAgrees_px = 1.0;
 
 }  // namespace
 
@@ -48,7 +50,11 @@ WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
 }
 
 LocalizedFrame WindowEstimator::localize(const Frame& frame) {
-  advance_to(frame.time_s);
+  if (!times_s_.empty()) {
+    interval_s_ = frame.time_s - times_s_.back();
+    speed_ = speed_ > 0.0 ? speed_ : assumed_step_ / interval_s_;
+  }
+  times_s_.push_back(frame.time_s);
   recognized_frame_ = -1;
   moved_.reset();
   LocalizedFrame localized;
@@ -65,14 +71,6 @@ LocalizedFrame WindowEstimator::localize(const Frame& frame) {
         project_lost_landmarks(window_, world_from_camera_, view_.points, camera());
   }
   return localized;
-}
-
-void WindowEstimator::advance_to(double time_s) {
-  if (!times_s_.empty()) {
-    interval_s_ = time_s - times_s_.back();
-    speed_ = speed_ > 0.0 ? speed_ : assumed_step_ / interval_s_;
-  }
-  times_s_.push_back(time_s);
 }
 
 FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& localized) {
@@ -119,7 +117,13 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
   is_initializing_ = false;
   const Rigid3 before = std::exchange(world_from_camera_, found);
   mark_outliers(frame.matches, localization_.inlier_bound_px, localized.inlier_mask);
-  follow_things(frame.matches, localized);
+  if (!moving_.empty()) {  // tracks of things that move on their own go on, and are no inliers
+    std::vector<char> fits_world(frame.matches.cur_uv.size(), 1);
+    mark_outliers(frame.matches, kAgrees_px, fits_world);
+    moving_.observe(frame.matches, fits_world);
+    localized.moving_mask = moving_.flags(frame.matches);
+    moving_.leave_out(frame.matches, localized.inlier_mask);
+  }
   Observations now = current_points(frame.matches, localized.inlier_mask);
   const SeenLandmarks seen = find_seen_landmarks(window_, now);
   const double bound_px = min_way_px();
@@ -146,6 +150,22 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
                               : FrameState::kRotating;
 }
 
+void WindowEstimator::mark_outliers(const Matches& matches,
+                                    double bound_px,
+                                    std::vector<char>& mask) const {
+  const Rigid3 camera_from_world = world_from_camera_.inverse();
+  if (is_last_localized_ && matches.prev_frame == last_.frame) {
+    mask = epipolar_inliers(camera_from_world * last_.world_from_camera,
+                            {matches.prev_uv, matches.cur_uv}, camera(), bound_px);
+  }
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    const auto landmark = window_.landmarks.find(matches.track_ids[i]);
+    if (landmark != window_.landmarks.end()) {
+      mask[i] = is_near(camera_from_world, landmark->second, matches.cur_uv[i], camera(), bound_px);
+    }
+  }
+}
+
 /// The less parallax, the more the motion model counts: at `parallax` 1 it does not.
 void WindowEstimator::fuse_with_prediction(const Rigid3& before,
                                            const SeenLandmarks& seen,
@@ -158,11 +178,6 @@ void WindowEstimator::fuse_with_prediction(const Rigid3& before,
   world_from_camera_ = before * fused_->prev_from_cur;
 }
 
-/// Nothing is measured: the last motion goes on.
-void WindowEstimator::go_on(const Frame& frame) {
-  world_from_camera_ = predict(trust_.trusted(frame.hints));
-}
-
 /// There are no landmarks yet, they are out of view, or the frame shows another scene.
 FrameState WindowEstimator::measure_since_reference(const Frame& frame,
                                                     const Observations& now,
@@ -172,7 +187,13 @@ FrameState WindowEstimator::measure_since_reference(const Frame& frame,
   const bool starts_elsewhere =
       reference.points.empty() && frame.matches.prev_frame != reference.frame;
   if (had_map || starts_elsewhere || initializer_.lost_reference(now)) {
-    reset_reference_before(frame.matches);
+    // Where the matches start: the frame before, or the last one before trouble.
+    const int first = std::max(frame.matches.prev_frame, 0);
+    reset_reference({first,
+                     trajectory_[static_cast<std::size_t>(first)],
+                     {},
+                     times_s_[static_cast<std::size_t>(first)],
+                     first == last_.frame ? last_.road : nullptr});
   }
   MeasuredMotion motion = initializer_.measure(frame.matches, now, camera());
   const double num_matches = static_cast<double>(frame.matches.cur_uv.size());
@@ -226,16 +247,6 @@ void WindowEstimator::reset_reference(View reference) {
   still_s_ = 0.0;
   moving_.clear();
   is_initializing_ = true;
-}
-
-/// Where the matches start: the frame before, or the last one before trouble.
-void WindowEstimator::reset_reference_before(const Matches& matches) {
-  const int frame = std::max(matches.prev_frame, 0);
-  reset_reference({frame,
-                   trajectory_[static_cast<std::size_t>(frame)],
-                   {},
-                   times_s_[static_cast<std::size_t>(frame)],
-                   frame == last_.frame ? last_.road : nullptr});
 }
 
 bool WindowEstimator::open_window(View view) {

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "mapping/mapper.hpp"
-#include "odometry/bundle_adjustment.hpp"
 #include "odometry/estimator.hpp"
 #include "odometry/initializer.hpp"
 #include "odometry/localization.hpp"
-#include "odometry/map_ids.hpp"
 #include "odometry/metric_scale.hpp"
 #include "odometry/motion_covariance.hpp"
 #include "odometry/motion_model.hpp"
@@ -25,6 +25,32 @@
 
 namespace stemvo {
 
+/// FrameResult::map_id.
+class MapIds {
+ public:
+  /// The map of the frame in work.
+  [[nodiscard]] int now() const { return now_; }
+  void begin() { now_ = num_maps_++; }
+  /// The camera is in the map of an earlier frame; one below 0 is another recording's.
+  void go_back_to(int frame) { now_ = of(frame); }
+  /// The map is joined to that of an earlier frame.
+  void join(int frame) {
+    const int joined = of(frame);
+    std::ranges::replace(of_frame_, now_, joined);
+    now_ = joined;
+  }
+  void end_frame() { of_frame_.push_back(now_); }
+
+ private:
+  [[nodiscard]] int of(int frame) const {
+    return frame < 0 ? -1 : of_frame_[static_cast<std::size_t>(frame)];
+  }
+
+  int now_ = 0;
+  int num_maps_ = 0;
+  std::vector<int> of_frame_;
+};
+
 /// The estimator (`odometry.mode: map`): a window of keyframes is the truth, and a frame is
 /// localized against its landmarks. It alone owns pose, window, scale and camera
 /// (docs/architecture.md).
@@ -35,7 +61,6 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] LocalizedFrame localize(const Frame& frame) override;
   void optimize(const Frame& frame, LocalizedFrame& localized) override;
 
-  [[nodiscard]] const std::vector<Rigid3>& trajectory() const override { return trajectory_; }
   [[nodiscard]] LandmarkChanges landmarks_since(int version) const override {
     return history_.changes_since(version, window_);
   }
@@ -57,7 +82,8 @@ class WindowEstimator final : public Estimator {
                                  bool is_still,
                                  LocalizedFrame& localized);
   void fuse_with_prediction(const Rigid3& before, const SeenLandmarks& seen, double parallax);
-  void go_on(const Frame& frame);
+  /// Nothing is measured: the last motion goes on.
+  void go_on(const Frame& frame) { world_from_camera_ = predict(trust_.trusted(frame.hints)); }
   /// Goes on in the map where the frame shows a kept place; false: it shows none.
   [[nodiscard]] bool relocate(const Frame& frame, const Observations& now, const Rigid3& predicted);
   FrameState measure_since_reference(const Frame& frame,
@@ -67,8 +93,6 @@ class WindowEstimator final : public Estimator {
                            const MeasuredMotion& motion,
                            LocalizedFrame& localized);
 
-  /// The times of a frame that begins.
-  void advance_to(double time_s);
   /// The pose if the last motion goes on. `turned`: its rotation, where that is known.
   [[nodiscard]] Rigid3 predict(const std::optional<Eigen::Quaterniond>& turned = {}) const {
     return world_from_camera_ * motion_.predict(interval_s_, turned);
@@ -78,7 +102,6 @@ class WindowEstimator final : public Estimator {
     return frame.has_image() && view_.frame == frame.number;
   }
   void reset_reference(View reference);
-  void reset_reference_before(const Matches& matches);
   [[nodiscard]] bool open_window(View view);
   [[nodiscard]] WindowView window_view() const {
     return {window_, history_, camera(), trajectory_, times_s_, metric_sigma_, view_.frame};
@@ -91,16 +114,12 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] double min_way_px() const;
   /// Matches that do not fit the pose: far from their landmark, or from their epipolar line.
   void mark_outliers(const Matches& matches, double bound_px, std::vector<char>& mask) const;
-  /// Tracks of things that move on their own are no inliers, and go on.
-  void follow_things(const Matches& matches, LocalizedFrame& localized);
 
   // After localization.
   [[nodiscard]] bool is_keyframe(const View& view) const;
   void add_keyframe(const Frame& frame);
   /// An old place was recognized: the window keeps to it.
   void take_in(const Recognition& recognition);
-  void move_world(const Similarity3& moved);
-  void add_move(const Rigid3& move, Matrix6d& covariance) const;
   /// Units of motion that move the median landmark in view by a pixel.
   [[nodiscard]] double pixel_units() const;
   void measure_scale(const Frame& frame, FrameState state);
@@ -144,8 +163,6 @@ class WindowEstimator final : public Estimator {
   int recognized_frame_ = -1;           ///< by the frame in work
   double still_s_ = 0.0;                ///< since the initializer's reference: stationary, rotating
   int keyframes_since_refinement_ = 0;
-  std::vector<Rigid3> trajectory_;
-  std::vector<double> times_s_;  ///< of the frames so far, the one in work among them
 };
 
 }  // namespace stemvo

@@ -13,12 +13,6 @@ namespace {
 constexpr int kMinKeyframes = 4;
 constexpr double kMinParallax_rad = 1.5 * std::numbers::pi / 180.0;
 
-double parallax_rad(const Eigen::Vector3d& point, const Keyframe& a, const Keyframe& b) {
-  const Eigen::Vector3d from_a = point - a.world_from_camera.translation;
-  const Eigen::Vector3d from_b = point - b.world_from_camera.translation;
-  return std::atan2(from_a.cross(from_b).norm(), from_a.dot(from_b));
-}
-
 std::array<std::uint8_t, 3> color_at(const cv::Mat& image, const Eigen::Vector2d& uv) {
   const cv::Point pixel(std::clamp(static_cast<int>(std::lround(uv.x())), 0, image.cols - 1),
                         std::clamp(static_cast<int>(std::lround(uv.y())), 0, image.rows - 1));
@@ -50,8 +44,9 @@ void WindowHistory::observe(const Window& window, const cv::Mat& image) {
       continue;
     }
     const auto oldest = std::ranges::find_if(window.keyframes, sees);
-    track.max_parallax_rad =
-        std::max(track.max_parallax_rad, parallax_rad(landmark->second, *oldest, newest));
+    track.max_parallax_rad = std::max(
+        track.max_parallax_rad,
+        parallax_rad(landmark->second, oldest->world_from_camera, newest.world_from_camera));
   }
   show(window);
 }
@@ -76,45 +71,6 @@ KeptLandmark WindowHistory::place(const Track& track,
   const Eigen::Vector3d in_camera =
       units(last_seen_from.frame) * (last_seen_from.world_from_camera.inverse() * point);
   return {track.id, last_seen_from.frame, in_camera.cast<float>(), track.rgb};
-}
-
-void WindowHistory::keep(const Window& window, const Keyframe& last_seen_from, int track_id) {
-  const auto track = tracks_.find(track_id);
-  if (track == tracks_.end()) {
-    return;
-  }
-  if (track->second.is_shown) {
-    left_.push_back({now(), place(track->second, last_seen_from, window.landmarks.at(track_id))});
-  }
-  tracks_.erase(track);
-}
-
-void WindowHistory::end_frame(const Window& window) {
-  ++num_frames_;
-  for (const Keyframe& keyframe : window.keyframes) {
-    const bool is_new = scale_of_keyframe_.try_emplace(keyframe.frame, scale_).second;
-    // A new map may begin at a keyframe of the one before.
-    if (is_new && (keyframes_.empty() || keyframe.frame > keyframes_.back())) {
-      keyframes_.push_back(keyframe.frame);
-    }
-  }
-}
-
-void WindowHistory::leave(const Window& window, std::size_t leaving, const Keyframe& coming) {
-  for (const int track_id : lost_tracks(window, leaving, coming)) {
-    keep(window, window.keyframes[leaving], track_id);
-  }
-  scale_of_keyframe_.erase(window.keyframes[leaving].frame);
-}
-
-void WindowHistory::close(const Window& window) {
-  for (auto keyframe = window.keyframes.rbegin(); keyframe != window.keyframes.rend(); ++keyframe) {
-    for (const Observation& observation : keyframe->points) {
-      keep(window, *keyframe, observation.track_id);
-    }
-  }
-  tracks_.clear();
-  scale_of_keyframe_.clear();
 }
 
 LandmarkChanges WindowHistory::changes_since(int version, const Window& window) const {

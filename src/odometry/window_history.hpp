@@ -26,7 +26,12 @@ class WindowHistory {
   void observe(const Window& window, const cv::Mat& image);
 
   /// A keyframe is about to leave the window for the one that comes.
-  void leave(const Window& window, std::size_t leaving, const Keyframe& coming);
+  void leave(const Window& window, std::size_t leaving, const Keyframe& coming) {
+    for (const int track_id : lost_tracks(window, leaving, coming)) {
+      keep(window, window.keyframes[leaving], track_id);
+    }
+    scale_of_keyframe_.erase(window.keyframes[leaving].frame);
+  }
   /// The window is put into other units.
   void rescale(double factor) {
     scale_ *= factor;
@@ -36,9 +41,27 @@ class WindowHistory {
   /// whose frame has ended.
   [[nodiscard]] double units(int frame) const { return scale_of_keyframe_.at(frame) / scale_; }
   /// The frame's pose is final: new keyframes have theirs in today's units.
-  void end_frame(const Window& window);
+  void end_frame(const Window& window) {
+    ++num_frames_;
+    for (const Keyframe& keyframe : window.keyframes) {
+      const bool is_new = scale_of_keyframe_.try_emplace(keyframe.frame, scale_).second;
+      // A new map may begin at a keyframe of the one before.
+      if (is_new && (keyframes_.empty() || keyframe.frame > keyframes_.back())) {
+        keyframes_.push_back(keyframe.frame);
+      }
+    }
+  }
   /// The whole window is about to be dropped.
-  void close(const Window& window);
+  void close(const Window& window) {
+    for (auto keyframe = window.keyframes.rbegin(); keyframe != window.keyframes.rend();
+         ++keyframe) {
+      for (const Observation& observation : keyframe->points) {
+        keep(window, *keyframe, observation.track_id);
+      }
+    }
+    tracks_.clear();
+    scale_of_keyframe_.clear();
+  }
 
   /// Changes of well-constrained landmarks, those that have left and those of the window. A version
   /// is a number of frames that have ended.
@@ -65,7 +88,16 @@ class WindowHistory {
   [[nodiscard]] KeptLandmark place(const Track& track,
                                    const Keyframe& last_seen_from,
                                    const Eigen::Vector3d& point) const;
-  void keep(const Window& window, const Keyframe& last_seen_from, int track_id);
+  void keep(const Window& window, const Keyframe& last_seen_from, int track_id) {
+    const auto track = tracks_.find(track_id);
+    if (track == tracks_.end()) {
+      return;
+    }
+    if (track->second.is_shown) {
+      left_.push_back({now(), place(track->second, last_seen_from, window.landmarks.at(track_id))});
+    }
+    tracks_.erase(track);
+  }
   void show(const Window& window);
 
   std::vector<Change<KeptLandmark>> left_;  ///< only added to

@@ -50,34 +50,21 @@ void WindowEstimator::take_in(const Recognition& recognition) {
   }
   recognized_frame_ = recognition.frame;
   if (recognition.moved.has_value()) {
-    move_world(*recognition.moved);
+    const Similarity3& moved = *recognition.moved;
+    move(window_, moved);
+    history_.rescale(moved.scale);
+    calibration_.restart();
+    for (Rigid3* pose :
+         {&world_from_camera_, &view_.world_from_camera, &last_.world_from_camera, &road_pose_}) {
+      *pose = moved * *pose;
+    }
+    moved_to_ = moved * moved_to_;
+    motion_.rescale(moved.scale);
+    speed_ *= moved.scale;
+    moved_ = moved;
     map_ids_.join(recognition.frame);
   }
   fix_landmarks(window_, camera(), recognition.landmarks, kMaxPull_px);
-}
-
-void WindowEstimator::move_world(const Similarity3& moved) {
-  move(window_, moved);
-  history_.rescale(moved.scale);
-  calibration_.restart();
-  for (Rigid3* pose :
-       {&world_from_camera_, &view_.world_from_camera, &last_.world_from_camera, &road_pose_}) {
-    *pose = moved * *pose;
-  }
-  moved_to_ = moved * moved_to_;
-  motion_.rescale(moved.scale);
-  speed_ *= moved.scale;
-  moved_ = moved;
-}
-
-/// A motion that is returned with a move of the world in it may be wrong by all of that.
-void WindowEstimator::add_move(const Rigid3& move, Matrix6d& covariance) const {
-  if (!moved_.has_value()) {
-    return;
-  }
-  const double angle = move.angle_rad();
-  covariance.topLeftCorner<3, 3>().diagonal().array() += move.translation.squaredNorm();
-  covariance.bottomRightCorner<3, 3>().diagonal().array() += angle * angle;
 }
 
 }  // namespace stemvo

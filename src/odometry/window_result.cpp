@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <cmath>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -45,7 +46,14 @@ void WindowEstimator::measure_covariance(const Frame& frame, LocalizedFrame& loc
       .camera_sigma = result.camera_sigma,
       .scale_sigma = metric_sigma(result)};
   result.motion_covariance = uncertainty_.finish(motion);
-  add_move(last.inverse() * world_from_prev, result.motion_covariance);
+  if (moved_.has_value()) {
+    // A motion that is returned with a move of the world in it may be wrong by all of that.
+    const Rigid3 move = last.inverse() * world_from_prev;
+    Eigen::Matrix<double, 6, 1> squares;
+    squares << Eigen::Vector3d::Constant(move.translation.squaredNorm()),
+        Eigen::Vector3d::Constant(std::pow(move.angle_rad(), 2));
+    result.motion_covariance.diagonal() += squares;
+  }
 }
 
 double WindowEstimator::pixel_units() const {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "report/trajectory_plot.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -53,11 +53,5 @@ struct Model {
 /// over a shifted frame agree (a graph that normalises over the whole image, say, is refused).
 [[nodiscard]] Expected<Model> open_model(const std::string& model);
 
-/// Runs the graph on small images and holds its outputs against kernel, stride and padding; see
-/// open_model. `label` is what messages call the file.
-[[nodiscard]] Status check_graph(const std::string& label,
-                                 const OnnxSession& session,
-                                 const ModelInfo& info);
-
 }  // namespace internal
 }  // namespace stemvo

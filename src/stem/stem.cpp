@@ -2,6 +2,7 @@
 #include "stem/stem.hpp"
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 
 #include <fmt/format.h>
@@ -9,16 +10,15 @@
 #include <opencv2/imgproc.hpp>
 
 #include "internal_check.hpp"
-#include "stem/hand_made.hpp"
 #include "stem/model.hpp"
 #include "stem/network_layer.hpp"
 #include "try.hpp"
 
 namespace stemvo {
-
 namespace {
 
 using internal::FilterBank;
+using internal::HandMadeBank;
 
 /// -1 stands for the default. Error: outside the layer.
 Expected<int> choose_filter(int asked, const std::string& of, int num_filters, int default_filter) {
@@ -84,6 +84,59 @@ void check_frame(const cv::Mat& frame) {
   STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
 }
 
+/// 0.299 R + 0.587 G + 0.114 B, not rounded.
+cv::Mat to_gray(const cv::Mat& frame) {
+  cv::Mat values;
+  frame.convertTo(values, CV_32F);  // first, so that gray is not rounded to 8 bit
+  if (frame.channels() == 3) {
+    cv::cvtColor(values.clone(), values, cv::COLOR_RGB2GRAY);
+  }
+  return values;
+}
+
+/// R, G, B as they are.
+Expected<std::vector<Channel>> input_channels(const cv::Mat& frame, int first, int last) {
+  std::vector<Channel> channels;
+  for (int filter = first; filter < last; ++filter) {
+    cv::Mat plane = frame;  // a gray frame has three equal colours
+    if (frame.channels() == 3) {
+      cv::extractChannel(frame, plane, filter);
+    }
+    plane.convertTo(channels.emplace_back().values, CV_32F);
+  }
+  return channels;
+}
+
+/// Laplacian of Gaussian at the size of what a tracker at half size resolves.
+cv::Mat laplacian_of_gaussian(const cv::Mat& gray) {
+  constexpr double kSigma_px = 2.0;
+  cv::Mat smooth;
+  cv::Mat values;
+  cv::GaussianBlur(gray, smooth, {}, kSigma_px);
+  cv::Laplacian(smooth, values, CV_32F);
+  return values;
+}
+
+/// (gray - mean) / (standard deviation + floor) of the surroundings: what the census transform
+/// compares, without its thresholds.
+cv::Mat local_contrast(const cv::Mat& gray) {
+  const cv::Size window(15, 15);
+  constexpr double kFloor = 4.0;  // gray levels
+  cv::Mat mean;
+  cv::Mat square;
+  cv::boxFilter(gray, mean, CV_32F, window);
+  cv::boxFilter(gray.mul(gray), square, CV_32F, window);
+  cv::Mat deviation = cv::max(square - mean.mul(mean), 0.0F);
+  cv::sqrt(deviation, deviation);
+  return (gray - mean) / (deviation + kFloor);
+}
+
+FilterBank of_gray(cv::Mat (*channel)(const cv::Mat& gray)) {
+  return [channel](const cv::Mat& frame, int, int) -> Expected<std::vector<Channel>> {
+    return std::vector<Channel>{{channel(to_gray(frame)), {}}};
+  };
+}
+
 }  // namespace
 
 Expected<Stem> Stem::create(const StemOptions& options, bool all_filters, int num_threads) {
@@ -125,13 +178,6 @@ Expected<Stem> Stem::create(const StemOptions& options, bool all_filters, int nu
       /*has_all=*/!info.only_filter);
 }
 
-Expected<Stem> Stem::load(const StemOptions& options, int num_threads) {
-  return create(options, /*all_filters=*/false, num_threads);
-}
-Expected<Stem> Stem::load_all(const StemOptions& options) {
-  return create(options, /*all_filters=*/true, 0);
-}
-
 Expected<Channel> Stem::apply(const cv::Mat& frame, int zoom) const {
   check_frame(frame);
   const int index = has_all_ ? info_.filter : 0;
@@ -148,6 +194,16 @@ Expected<std::vector<Channel>> Stem::apply_range(const cv::Mat& frame,
                "a range of filters lies inside the layer");
   STEMVO_CHECK(has_all_, "the stem was made with all filters");
   return apply_enlarged(bank_, frame, first, last, zoom);
+}
+
+std::optional<HandMadeBank> internal::hand_made_bank(const std::string& model) {
+  static const std::map<std::string, HandMadeBank> kBanks = {
+      {"gray", {1, of_gray([](const cv::Mat& gray) { return gray; })}},
+      {"input_layer", {3, input_channels}},
+      {"log", {1, of_gray(laplacian_of_gaussian)}},
+      {"census", {1, of_gray(local_contrast)}}};
+  const auto found = kBanks.find(model);
+  return found != kBanks.end() ? std::optional(found->second) : std::nullopt;
 }
 
 }  // namespace stemvo

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,7 +32,19 @@ namespace internal {
 using FilterBank =
     std::function<Expected<std::vector<Channel>>(const cv::Mat& frame, int first, int last)>;
 
+struct HandMadeBank {
+  int num_filters = 1;
+  FilterBank bank;
+};
+/// nullopt: not a name of one.
+[[nodiscard]] std::optional<HandMadeBank> hand_made_bank(const std::string& model);
+
 }  // namespace internal
+
+/// Whether it names channels without a network, to compare a learned one with.
+[[nodiscard]] inline bool is_hand_made(const std::string& model) {
+  return internal::hand_made_bank(model).has_value();
+}
 
 /// Filters of a layer of a network: frame in, channels out. Const and gives the same bytes whatever
 /// the number of threads. Frames are CV_8UC3 in RGB order, or CV_8UC1
@@ -44,9 +57,13 @@ class Stem {
   /// than the graph's, inputs or outputs other than 1x3xHxW or 1x1xHxW -> 1xCxhxw float, filter
   /// outside [0, C), sampling_px not a divisor of the stride (lists the allowed values).
   /// `num_threads`: of OpenCV's, that may work on a frame at a time; 0: all it has.
-  [[nodiscard]] static Expected<Stem> load(const StemOptions& options, int num_threads = 0);
+  [[nodiscard]] static Expected<Stem> load(const StemOptions& options, int num_threads = 0) {
+    return create(options, /*all_filters=*/false, num_threads);
+  }
   /// The same with all filters, for `apply_all` and `apply_range` too.
-  [[nodiscard]] static Expected<Stem> load_all(const StemOptions& options);
+  [[nodiscard]] static Expected<Stem> load_all(const StemOptions& options) {
+    return create(options, /*all_filters=*/true, 0);
+  }
 
   [[nodiscard]] const StemInfo& info() const { return info_; }
   /// How many times larger (bicubic) the frame is made for the filters: 2 or 1.

@@ -2,9 +2,10 @@
 #include <algorithm>
 #include <optional>
 
+#include "synth/buildings.hpp"
 #include "synth/drive.hpp"
 #include "synth/materials.hpp"
-#include "synth/objects.hpp"
+#include "synth/vehicles.hpp"
 
 namespace stemvo::synth {
 namespace {

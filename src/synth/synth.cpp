@@ -36,7 +36,7 @@ Camera camera_of(const SyntheticDriveOptions& options) {
 
 Expected<synth::Drive> plan_drive(const SyntheticDriveOptions& options) {
   if (!options.trajectory) {
-    return synth::make_own_drive(options.num_frames, options.seed, options.render.traffic);
+    return synth::make_own_drive(options.num_frames, options.seed, options.traffic);
   }
   STEMVO_TRY_GET(auto poses, read_kitti_trajectory(*options.trajectory));
   poses.resize(std::min(poses.size(), static_cast<std::size_t>(options.num_frames)));
@@ -45,11 +45,17 @@ Expected<synth::Drive> plan_drive(const SyntheticDriveOptions& options) {
 
 Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
   if (options.walk) {
-    return synth::make_walk(options.num_frames, options.seed, options.render);
+    std::optional<double> turn_rate_rad_s;
+    if (options.turn_rate_deg_s) {
+      turn_rate_rad_s = synth::radians(*options.turn_rate_deg_s);
+    }
+    return synth::make_walk(
+        options.num_frames, options.seed,
+        {options.walk_rate_hz, options.visit, options.blank_walls, turn_rate_rad_s});
   }
   STEMVO_TRY_GET(auto drive, plan_drive(options));
-  if (options.render.visit > 0) {
-    synth::drive_again(options.seed, options.render.visit, drive);
+  if (options.visit > 0) {
+    synth::drive_again(options.seed, options.visit, drive);
   }
   return drive;
 }
@@ -79,7 +85,7 @@ Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
   if (options.write_depth) {
     fs::create_directory(drive.sequence / "depth", code);
   }
-  if (options.render.traffic) {
+  if (options.traffic) {
     fs::create_directory(drive.sequence / "moving", code);
   }
   STEMVO_TRY(pipeline::create_out_folder(drive.poses.parent_path()));
@@ -110,7 +116,7 @@ Status render_frames(const synth::Renderer& renderer,
       // Noise does not compress: the fastest level costs a few per cent of size.
       result = write_text_file(sequence / fmt::format("image_2/{:06}.png", i),
                                io::encode_png(frame.rgb, true));
-      if (result && options.render.traffic) {
+      if (result && options.traffic) {
         result = write_text_file(sequence / fmt::format("moving/{:06}.png", i),
                                  io::encode_png(frame.moving));
       }
@@ -162,7 +168,10 @@ Status render_synthetic_drive(const fs::path& out_dir,
                           out_dir / "poses" / (options.name + ".txt")};
   STEMVO_TRY_GET(const auto lock, open_folder(drive, options));
   const Camera camera = camera_of(options);
-  const synth::Renderer renderer(std::move(path), camera, options.seed, options.render);
+  const double rate_hz = options.walk ? options.walk_rate_hz : synth::kDriveRate_hz;
+  const synth::Renderer renderer(std::move(path), camera, options.seed,
+                                 {options.visit, options.traffic, rate_hz, options.exposure_s,
+                                  options.readout_s, options.small_chip, options.follows_light});
   const Trajectory& poses = renderer.world_from_camera();
   const int total = static_cast<int>(poses.size());
   const int batch = std::max(1, cv::getNumThreads());  // frames at once: bounds the memory
@@ -177,7 +186,7 @@ Status render_synthetic_drive(const fs::path& out_dir,
     go_on = !progress || progress(static_cast<std::size_t>(done), poses.size());
   }
   return write_texts(drive, camera, std::span(poses).first(static_cast<std::size_t>(done)),
-                     renderer.rate_hz());
+                     rate_hz);
 }
 
 }  // namespace stemvo

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "dataset/frame_files.hpp"
+#include "dataset/kitti_text.hpp"
 #include "support/program_test.hpp"
 #include "support/shared_data.hpp"
 #include "support/state_runs.hpp"

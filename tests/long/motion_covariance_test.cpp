@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "dataset/frame_files.hpp"
+#include "dataset/kitti_text.hpp"
 #include "evaluation/trajectory.hpp"
 #include "stemvo/odometry.hpp"
 #include "support/drives.hpp"

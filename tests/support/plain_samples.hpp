@@ -3,7 +3,7 @@
 
 #include <complex>
 
-#include "features/patch_kernels.hpp"
+#include "features/patch_alignment.hpp"
 #include "support/test.hpp"
 
 /// How an image is sampled, to be read, not to be fast. Complex numbers are points and

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "evaluation/pose_file.hpp"
 #include "evaluation/trajectory.hpp"
 #include "support/test.hpp"
 

@@ -2,7 +2,6 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "features/patch_alignment.hpp"
-#include "features/patch_kernels.hpp"
 #include "instruction_set.hpp"
 #include "stemvo/options.hpp"
 #include "support/plain_samples.hpp"

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "features/front_end.hpp"
-#include "features/grid_quota.hpp"
 #include "support/test.hpp"
 
 namespace stemvo {

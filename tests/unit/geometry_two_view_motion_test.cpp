@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "geometry/triangulation.hpp"
 #include "geometry/two_view_models.hpp"
-#include "geometry/two_view_motion.hpp"
 #include "stemvo/camera.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "odometry/bundle_adjustment.hpp"
 #include "odometry/window.hpp"
 #include "support/synthetic_drive_tracks.hpp"
 #include "support/test.hpp"

@@ -7,22 +7,6 @@
 
 namespace stemvo {
 
-RoadWarp::RoadWarp(const Rigid3& cur_from_prev, const RoadPrior& prior, double camera_height_m)
-    : given_rotation(cur_from_prev.inverse().rotation_matrix()),
-      translation(cur_from_prev.inverse().translation),
-      plane(road_plane(prior.log_scale, prior.slope_rad, prior.roll_rad, camera_height_m)),
-      drop(prior.drop) {}
-
-Eigen::Matrix3d RoadWarp::rotation() const {
-  return so3_exp(correction).toRotationMatrix() * given_rotation;
-}
-
-double RoadWarp::inverse_depth(const Eigen::Vector3d& ray) const {
-  const double flat = plane.dot(ray);
-  const double root = 1.0 - 4.0 * drop * plane.squaredNorm() / (flat * flat);
-  return flat > 0.0 && root > kMinRoadRoot ? 0.5 * flat * (1.0 + std::sqrt(root)) : 0.0;
-}
-
 void RoadNormal::inflate_variance(const Eigen::Vector3d& spread) {
   const Eigen::Vector3d expected = information.diagonal().head<3>().cwiseMax(1e-12);
   const double chi2_per_dof = spread.cwiseQuotient(expected).mean();

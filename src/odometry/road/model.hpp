@@ -95,11 +95,21 @@ struct RoadWarp {
   double drop = 0.0;
   Eigen::Vector3d correction = Eigen::Vector3d::Zero();  ///< w, rad
 
-  RoadWarp(const Rigid3& cur_from_prev, const RoadPrior& prior, double camera_height_m);
-  [[nodiscard]] Eigen::Matrix3d rotation() const;
+  RoadWarp(const Rigid3& cur_from_prev, const RoadPrior& prior, double camera_height_m)
+      : given_rotation(cur_from_prev.inverse().rotation_matrix()),
+        translation(cur_from_prev.inverse().translation),
+        plane(road_plane(prior.log_scale, prior.slope_rad, prior.roll_rad, camera_height_m)),
+        drop(prior.drop) {}
+  [[nodiscard]] Eigen::Matrix3d rotation() const {
+    return so3_exp(correction).toRotationMatrix() * given_rotation;
+  }
   /// 1/z where a ray (x, y, 1) meets the road: the solution of q^2 - (m . ray) q + drop |m|^2 = 0;
   /// 0 where it does not (sky, behind a crest).
-  [[nodiscard]] double inverse_depth(const Eigen::Vector3d& ray) const;
+  [[nodiscard]] double inverse_depth(const Eigen::Vector3d& ray) const {
+    const double flat = plane.dot(ray);
+    const double root = 1.0 - 4.0 * drop * plane.squaredNorm() / (flat * flat);
+    return flat > 0.0 && root > kMinRoadRoot ? 0.5 * flat * (1.0 + std::sqrt(root)) : 0.0;
+  }
 };
 
 /// Normal equations of a Gauss-Newton step.

@@ -66,12 +66,6 @@ void RoadPath::move(const Rigid3& cur_from_prev) {
   }
 }
 
-void RoadPath::rescale(double factor) {
-  for (Eigen::Vector3d& position : positions_) {
-    position *= factor;
-  }
-}
-
 void RoadPath::predict(double metres_per_unit, RoadPrior& prior) const {
   const double weight = 1.0 / (options_.heave_sigma_m * options_.heave_sigma_m);
   Eigen::Matrix3d information =
@@ -95,26 +89,6 @@ void RoadPath::predict(double metres_per_unit, RoadPrior& prior) const {
   prior.slope_rad = profile[1];
   prior.drop = options_.camera_height_m * profile[2];
   prior.profile_information = of_slope_and_drop.inverse();
-}
-
-double RoadScale::sigma(const ScaleFilter& filter) const {
-  const double sigma = belief_.sigma_factor() * filter.sigma();
-  return belief_.is_believed() ? std::min(ScaleFilter::kUnknownSigma, sigma)
-                               : ScaleFilter::kUnknownSigma;
-}
-
-void RoadScale::rescale(double factor) {
-  path_.rescale(factor);
-  for (Past& past : past_) {
-    past.now_from_past.translation *= factor;
-  }
-}
-
-void RoadScale::restart() {
-  belief_.restart();
-  past_.clear();
-  path_.restart();
-  frames_unmeasured_ = 0;
 }
 
 const RoadScale::Past* RoadScale::pick_past(const ScaleFilter& filter) const {
@@ -151,13 +125,6 @@ RoadPrior RoadScale::make_prior(const Rigid3& motion, const ScaleFilter& filter)
   }
   path_.predict(std::exp(prior.log_scale), prior);
   return prior;
-}
-
-void RoadScale::remember(RoadImage image) {
-  past_.push_front({std::move(image), Rigid3{}});
-  if (past_.size() > static_cast<std::size_t>(std::max(1, options_.max_frames_apart))) {
-    past_.pop_back();
-  }
 }
 
 void RoadScale::count(const std::vector<RoadLandmark>& landmarks,

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <deque>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -26,7 +29,11 @@ class RoadPath {
 
   /// `cur_from_prev`: in units of the map.
   void move(const Rigid3& cur_from_prev);
-  void rescale(double factor);
+  void rescale(double factor) {
+    for (Eigen::Vector3d& position : positions_) {
+      position *= factor;
+    }
+  }
   void restart() { positions_.clear(); }
 
   /// Fills slope, drop and their information: y = y0 + slope z + drop / height z^2 through the
@@ -59,11 +66,25 @@ class RoadScale {
                            ScaleFilter& filter,
                            const std::vector<RoadLandmark>& landmarks = {});
   /// The sigma of log(metres per unit) by this filter: unknown while no road is believed.
-  [[nodiscard]] double sigma(const ScaleFilter& filter) const;
+  [[nodiscard]] double sigma(const ScaleFilter& filter) const {
+    const double sigma = belief_.sigma_factor() * filter.sigma();
+    return belief_.is_believed() ? std::min(ScaleFilter::kUnknownSigma, sigma)
+                                 : ScaleFilter::kUnknownSigma;
+  }
   /// The map was multiplied by `factor` (new units = factor * old units).
-  void rescale(double factor);
+  void rescale(double factor) {
+    path_.rescale(factor);
+    for (Past& past : past_) {
+      past.now_from_past.translation *= factor;
+    }
+  }
   /// Nothing connects the next frame with the ones before (lost, cut): units may be different ones.
-  void restart();
+  void restart() {
+    belief_.restart();
+    past_.clear();
+    path_.restart();
+    frames_unmeasured_ = 0;
+  }
 
  private:
   struct Past {
@@ -73,7 +94,12 @@ class RoadScale {
   /// The nearest past frame that is far enough away; nullptr where the car did not move.
   [[nodiscard]] const Past* pick_past(const ScaleFilter& filter) const;
   [[nodiscard]] RoadPrior make_prior(const Rigid3& motion, const ScaleFilter& filter) const;
-  void remember(RoadImage image);
+  void remember(RoadImage image) {
+    past_.push_front({std::move(image), Rigid3{}});
+    if (past_.size() > static_cast<std::size_t>(std::max(1, options_.max_frames_apart))) {
+      past_.pop_back();
+    }
+  }
   /// Both estimators, joined and given to the filter. Returns why nothing is believed, else empty.
   std::string_view measure(const Past& past,
                            const RoadImage& image,
