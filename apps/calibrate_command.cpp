@@ -6,11 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/calibrate.hpp"
-#include "calibration/calibrate_board.hpp"
 #include "commands.hpp"
 #include "console.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 #include "try.hpp"
 
 namespace stemvo::apps {

@@ -8,7 +8,6 @@
 #include "console.hpp"
 #include "options.hpp"
 #include "pipeline/channel_images.hpp"
-#include "progress.hpp"
 #include "try.hpp"
 
 namespace stemvo::apps {

@@ -16,7 +16,6 @@
 #include "commands.hpp"
 #include "config/config.hpp"
 #include "console.hpp"
-#include "progress.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
 

@@ -10,7 +10,6 @@
 #include "console.hpp"
 #include "options.hpp"
 #include "pipeline/run.hpp"
-#include "progress.hpp"
 #include "report/metrics_json.hpp"
 #include "try.hpp"
 

@@ -9,7 +9,6 @@
 #include "commands.hpp"
 #include "console.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 #include "synth/synth.hpp"
 #include "text/text_file.hpp"
 
@@ -85,42 +84,43 @@ void add_options(CLI::App& command, SynthArguments& arguments) {
                    : "expected a whole number from 0 to 18446744073709551615, found " + text;
       });
   command
-      .add_option("--visit", options.visit,
+      .add_option("--visit", options.render.visit,
                   "The same place again, on another path and in other light (with the same "
                   "--trajectory, --frames, --seed); default 0: the first time")
       ->type_name("N")
       ->check(in_range(0, 1000000));
   CLI::Option* walk = command.get_option("--walk");
   command
-      .add_flag("--traffic", options.traffic,
+      .add_flag("--traffic", options.render.traffic,
                 "Cars, lorries and people that move; an own drive stands at crossings; also "
                 "moving/NNNNNN.png: 255 where something moves")
       ->excludes(walk);
-  command.add_flag("--blank-walls", options.blank_walls, "A walk between walls of one colour")
+  command
+      .add_flag("--blank-walls", options.render.blank_walls, "A walk between walls of one colour")
       ->needs(walk);
   command
-      .add_option("--turn-rate", options.turn_rate_deg_s,
+      .add_option("--turn-rate", options.render.turn_rate_deg_s,
                   "A walk's turns on the spot, at their fastest; default 67 to 86")
       ->type_name("DEG_S")
       ->check(in_range(10.0, 400.0))
       ->needs(walk);
   command
       .add_option_function<double>(
-          "--exposure", [&options](double ms) { options.exposure_s = 1e-3 * ms; },
+          "--exposure", [&options](double ms) { options.render.exposure_s = 1e-3 * ms; },
           "Motion blur; the pose is that of the exposure's middle; default none")
       ->type_name("MS")
       ->check(in_range(0.0, 100.0));
   command
       .add_option_function<double>(
-          "--readout", [&options](double ms) { options.readout_s = 1e-3 * ms; },
+          "--readout", [&options](double ms) { options.render.readout_s = 1e-3 * ms; },
           "Rolling shutter, from the first row to the last; the pose is the middle row's; "
           "default none")
       ->type_name("MS")
       ->check(in_range(0.0, 100.0));
-  command.add_flag("--small-chip", options.small_chip,
+  command.add_flag("--small-chip", options.render.small_chip,
                    "A small camera's chip: point spread, gaps between pixels, photon and read "
                    "noise, response curve; default: an almost perfect one");
-  command.add_flag("--auto-exposure", options.follows_light,
+  command.add_flag("--auto-exposure", options.render.follows_light,
                    "Exposure that follows the light within half a second");
   command.add_option("--width", options.width_px, "Pixels; default 1241, with --walk 640")
       ->type_name("W")

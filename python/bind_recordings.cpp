@@ -16,7 +16,7 @@
 
 namespace stemvo {
 
-/// In place of video_source.cpp: OpenCV's videoio would bring FFmpeg and GDAL into the package.
+/// In place of video_stream.cpp: OpenCV's videoio would bring FFmpeg and GDAL into the package.
 Expected<FrameSource> dataset::open_video(const FrameSourceRequest& request) {
   return fail(fmt::format(
       "{}: expected a folder or a pattern of images, found a video or a camera; read it with cv2 "

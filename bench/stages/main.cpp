@@ -8,7 +8,7 @@
 #include <benchmark/benchmark.h>
 #include <opencv2/core/utility.hpp>
 
-#include "pipeline/thread_scope.hpp"
+#include "pipeline/frame_pipeline.hpp"
 #include "stages/drive.hpp"
 #include "stages/images.hpp"
 #include "stemvo/version.hpp"

@@ -6,6 +6,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo {
@@ -35,5 +36,44 @@ struct BoardPoints {
 /// there. ChArUco boards are of OpenCV 4.6's layout or the older one, grids of tags begin at the
 /// upper left (OpenCV) or lower left (Kalibr): what fits. Error: no module or no dictionary.
 [[nodiscard]] Expected<BoardPoints> find_board(const Board& board, const cv::Mat& gray);
+
+/// A picture of the board.
+struct BoardView {
+  std::string name;
+  BoardPoints points;
+  cv::Vec3d camera_from_board_r = {};  ///< Rodrigues
+  cv::Vec3d camera_from_board_t = {};  ///< m
+  double error_px = 0.0;               ///< root mean square, per corner
+  bool is_used = true;                 ///< else its error was too large beside the others'
+};
+
+/// One number of the camera with its standard deviation.
+struct FittedNumber {
+  std::string name;
+  double value = 0.0;
+  double sigma = 0.0;
+};
+
+/// The camera that views of a board tell.
+struct BoardFit {
+  Camera camera;
+  std::vector<FittedNumber> numbers;  ///< fx, fy, cx, cy, k1, k2, p1, p2, k3
+  double error_px = 0.0;              ///< root mean square, per corner, of the views used
+};
+
+/// OpenCV's calibration, radial-tangential, with k3 where that is more than three sigmas. A view
+/// whose error is over three times the median's and over a quarter of a pixel is left out, the
+/// worst first. Sets the views' poses and errors. Errors: under three views; views that tell no
+/// camera.
+[[nodiscard]] Expected<BoardFit> fit_camera(std::vector<BoardView>& views, const cv::Size& size);
+
+/// Names what pictures to take next, a line each: parts of the image without corners, tilts and
+/// distances that lack. Empty: the views suffice. `views` have their poses.
+[[nodiscard]] std::vector<std::string> missing_views(const std::vector<BoardView>& views,
+                                                     const cv::Size& size);
+
+/// Corners on the image's area, those of views left out hollow; parts without corners are red.
+/// CV_8UC3, RGB.
+[[nodiscard]] cv::Mat draw_coverage(const std::vector<BoardView>& views, const cv::Size& size);
 
 }  // namespace stemvo

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include "calibration/calibrate_board.hpp"
-
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
-#include "calibration/board_coverage.hpp"
+#include "calibration/board.hpp"
+#include "calibration/calibrate.hpp"
 #include "dataset/camera_file.hpp"
 #include "dataset/frame_files.hpp"
 #include "dataset/listing.hpp"
@@ -83,9 +82,7 @@ Expected<cv::Size> look_at_images(const BoardRequest& request,
   STEMVO_TRY(check_place(request.out_file, frames.files.front()));
   STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames));
   report.warnings = frames.warnings;
-  if (!listing.warning.empty()) {
-    report.warnings.push_back(listing.warning);
-  }
+  add_line(report.warnings, listing.warning);
   for (std::size_t i = 0; i < frames.files.size() && !report.interrupted; ++i) {
     const auto image = io::read_image(frames.files[i], false, kind.size, kind.levels);
     if (image) {
@@ -104,7 +101,7 @@ Expected<cv::Size> look_at_video(const BoardRequest& request,
                                  BoardReport& report) {
   STEMVO_TRY(pipeline::check_is_no_input(request.out_file, {request.pictures}));
   STEMVO_TRY_GET(const auto stream, dataset::VideoStream::open_file(request.pictures, {}));
-  report.warnings = dataset::warn_of_turn(*stream, request.pictures.string());
+  add_line(report.warnings, dataset::warn_of_turn(*stream, request.pictures.string()));
   constexpr std::size_t kMaxLooks = 300;
   constexpr std::size_t kUsualStep = 5;
   const std::size_t num_frames = stream->expected_frames();

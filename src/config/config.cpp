@@ -70,7 +70,7 @@ Expected<Config> load_config(const std::filesystem::path& file, const Config& ba
   Config result = base;
   result.file = file;
   std::vector<config::Key> keys = keys_of(result);
-  STEMVO_TRY(config::read_document(root, file.string(), keys));
+  STEMVO_TRY(config::read_map(root, "", file.string(), keys));
   for (const config::Key& key : keys) {
     if (key.is_given) {
       result.keys_in_file.insert(key.name());

@@ -114,21 +114,6 @@ std::string_view kind_of(const YAML::Node& node) {
   }
 }
 
-/// The whole text or nothing; a leading '+' is allowed as in YAML.
-template <typename Number>
-std::string parse_number(std::string_view kind, const YAML::Node& node, Number& value) {
-  std::string text;
-  if (std::string problem = parse(node, text); !problem.empty()) {
-    return problem;
-  }
-  const bool has_plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
-  const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data() + (has_plus ? 1 : 0), end, value);
-  return error == std::errc() && stop == end
-             ? std::string()
-             : fmt::format("expected {}, found '{}'", kind, one_line(text));
-}
-
 /// Finds where documents begin: YAML::Load reads the first and leaves out others without a word.
 class DocumentLines final : public YAML::EventHandler {
  public:
@@ -154,7 +139,8 @@ class DocumentLines final : public YAML::EventHandler {
   void OnMapEnd() override {}
 };
 
-/// Reads one map, that of the top level (section empty) or of a section.
+}  // namespace
+
 Status read_map(const YAML::Node& map,
                 std::string_view section,
                 std::string_view source,
@@ -190,8 +176,6 @@ Status read_map(const YAML::Node& map,
   return {};
 }
 
-}  // namespace
-
 Expected<YAML::Node> parse_document(const std::string& text, std::string_view source) {
   try {
     std::istringstream stream(text);
@@ -224,17 +208,26 @@ std::string parse(const YAML::Node& node, bool& value) {
              : fmt::format("expected true or false, found '{}'", one_line(text));
 }
 
-std::string parse(const YAML::Node& node, int& value) {
-  return parse_number("a whole number", node, value);
+template <options::Number N>
+std::string parse(const YAML::Node& node, N& value) {
+  std::string text;
+  if (std::string problem = parse(node, text); !problem.empty()) {
+    return problem;
+  }
+  // The whole text or nothing; a leading '+' is allowed as in YAML.
+  const bool has_plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data() + (has_plus ? 1 : 0), end, value);
+  const char* kind = std::is_floating_point_v<N> ? "a number"
+                     : std::is_unsigned_v<N>     ? "a whole number of at least 0"
+                                                 : "a whole number";
+  return error == std::errc() && stop == end
+             ? std::string()
+             : fmt::format("expected {}, found '{}'", kind, one_line(text));
 }
-
-std::string parse(const YAML::Node& node, double& value) {
-  return parse_number("a number", node, value);
-}
-
-std::string parse(const YAML::Node& node, std::uint64_t& value) {
-  return parse_number("a whole number of at least 0", node, value);
-}
+template std::string parse(const YAML::Node&, int&);
+template std::string parse(const YAML::Node&, double&);
+template std::string parse(const YAML::Node&, std::uint64_t&);
 
 std::string parse(const YAML::Node& node, std::vector<double>& value) {
   if (node.IsScalar()) {
@@ -298,10 +291,6 @@ std::string read_key(std::string_view section,
   return problem.empty() || !value.IsScalar()
              ? problem
              : problem + new_name(fmt::format("{}={}", found->name(), value.Scalar()));
-}
-
-Status read_document(const YAML::Node& root, std::string_view source, std::vector<Key>& keys) {
-  return read_map(root, "", source, keys);
 }
 
 }  // namespace stemvo::config

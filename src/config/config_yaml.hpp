@@ -22,9 +22,8 @@ namespace stemvo::config {
 /// Read a value, numbers in decimal ("010" is ten). Nothing, or "expected ..., found ...". A list
 /// may also stand in a text, as --set gives it.
 [[nodiscard]] std::string parse(const YAML::Node& node, bool& value);
-[[nodiscard]] std::string parse(const YAML::Node& node, int& value);
-[[nodiscard]] std::string parse(const YAML::Node& node, double& value);
-[[nodiscard]] std::string parse(const YAML::Node& node, std::uint64_t& value);
+template <options::Number N>
+[[nodiscard]] std::string parse(const YAML::Node& node, N& value);
 [[nodiscard]] std::string parse(const YAML::Node& node, std::string& value);
 [[nodiscard]] std::string parse(const YAML::Node& node, std::vector<double>& value);
 template <options::Enumeration Enum>
@@ -75,11 +74,13 @@ struct Key {
   [[nodiscard]] std::string name() const { return options::full_name(section, key); }
 };
 
-/// Reads a document into the keys it names, and marks them. Errors "<source>:<line>: <key>: ...":
-/// unknown or duplicated key, wrong type, value the rule refuses.
-[[nodiscard]] Status read_document(const YAML::Node& root,
-                                   std::string_view source,
-                                   std::vector<Key>& keys);
+/// Reads a document (section empty), or one of its sections, into the keys it names, and marks
+/// them. Errors "<source>:<line>: <key>: ...": unknown or duplicated key, wrong type, value the
+/// rule refuses.
+[[nodiscard]] Status read_map(const YAML::Node& map,
+                              std::string_view section,
+                              std::string_view source,
+                              std::vector<Key>& keys);
 
 /// Reads one value into the key of this name. Nothing, or the problem: unknown key, value refused.
 [[nodiscard]] std::string read_key(std::string_view section,

@@ -2,17 +2,97 @@
 #include "dataset/frame_files.hpp"
 
 #include <algorithm>
+#include <numeric>
+#include <optional>
 #include <span>
 #include <system_error>
 
 #include <fmt/format.h>
 
+#include "dataset/camera_file.hpp"
+#include "io/image_file.hpp"
 #include "odometry/check_frame.hpp"
+#include "text/text_file.hpp"
 #include "try.hpp"
 
 namespace stemvo::dataset {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kBlack = 128;
+
+/// `X,Y,WIDTH,HEIGHT`; nullopt: no four numbers.
+std::optional<cv::Rect2d> parse_rectangle(std::string part) {
+  std::ranges::replace(part, ',', ' ');
+  const auto numbers = parse_numbers(part, 4);
+  return numbers
+             ? std::optional(cv::Rect2d((*numbers)[0], (*numbers)[1], (*numbers)[2], (*numbers)[3]))
+             : std::nullopt;
+}
+
+Status add_part(const std::string& part, cv::Mat& mask) {
+  if (const auto rectangle = parse_rectangle(part)) {
+    const cv::Rect inside = *rectangle & cv::Rect2d(0, 0, mask.cols, mask.rows);
+    if (inside.empty()) {
+      return fail(fmt::format("--mask {}: expected a rectangle inside frames of {}x{} pixels", part,
+                              mask.cols, mask.rows));
+    }
+    mask(inside).setTo(0);
+    return {};
+  }
+  const auto image = io::read_image(part, false);
+  if (!image) {
+    return fail(
+        fmt::format("--mask: expected X,Y,WIDTH,HEIGHT in pixels of the frames, as "
+                    "0,300,1241,76, or an image, found {}",
+                    image.error().message));
+  }
+  if (image->size() != mask.size()) {
+    return fail(fmt::format("{}: expected a mask of {}x{} pixels, as the frames, found {}x{}", part,
+                            mask.cols, mask.rows, image->cols, image->rows));
+  }
+  mask.setTo(0, *image < kBlack);
+  return {};
+}
+
+/// The times of all images, where something says them.
+Expected<TimedRows<double>> find_times(const Listing& listing, const FrameSourceRequest& request) {
+  const std::size_t num_images = listing.files.size();
+  const auto& file = request.times ? request.times : listing.times_file;
+  if (request.rate_hz && (file || !listing.times_s.empty())) {
+    return fail(fmt::format("--rate {}: expected images without times, found {}", *request.rate_hz,
+                            file ? file->string() : "those of the list of images"));
+  }
+  if (!file) {
+    return TimedRows<double>{listing.times_s, listing.note};
+  }
+  auto read = read_kitti_times(*file, num_images);
+  if (read && read->rows.size() != num_images) {
+    return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
+                            file->string(), num_images, read->rows.size()));
+  }
+  return read;
+}
+
+/// Error: images that are not of the camera file's size.
+Expected<SharedKind> check_images(FrameSource& frames,
+                                  const fs::path& folder,
+                                  const fs::path& camera_file,
+                                  const Camera& camera) {
+  STEMVO_TRY_GET(const auto kind, vote_on_images(frames));
+  if (kind.size != cv::Size(camera.width_px, camera.height_px)) {
+    return fail(
+        fmt::format("{}: expected images of {}x{} pixels, as {} says, found {}x{}; "
+                    "give the camera file of that size",
+                    folder.string(), camera.width_px, camera.height_px, camera_file.string(),
+                    kind.size.width, kind.size.height));
+  }
+  return kind;
+}
+
+}  // namespace
 
 bool is_folder(const fs::path& path) {
   std::error_code code;
@@ -95,30 +175,19 @@ Status add_ground_truth(FrameSource& frames,
   return {};
 }
 
-void add_note(FrameSource& frames, const std::string& note) {
-  if (!note.empty()) {
-    frames.notes.push_back(note);
-  }
-}
-
 double rate_of(const CameraFile& camera, const FrameSourceRequest& request, FrameSource& frames) {
   constexpr double kUsualRate_hz = 30.0;
   if (!camera.rate_hz && !request.rate_hz) {
-    add_note(frames, fmt::format("times: {} frames per second are taken for granted; --rate HZ, "
-                                 "--times FILE or rate_hz in the camera file says another",
-                                 kUsualRate_hz));
+    add_line(frames.notes,
+             fmt::format("times: {} frames per second are taken for granted; --rate HZ, "
+                         "--times FILE or rate_hz in the camera file says another",
+                         kUsualRate_hz));
   } else if (camera.rate_hz && request.rate_hz && *camera.rate_hz != *request.rate_hz) {
     frames.warnings.push_back(
         fmt::format("--rate {}: the camera file's rate_hz goes before it: {} frames per second",
                     *request.rate_hz, *camera.rate_hz));
   }
   return camera.rate_hz.value_or(request.rate_hz.value_or(kUsualRate_hz));
-}
-
-void warn_of_camera(FrameSource& frames) {
-  if (std::string doubt = doubt_of(frames.camera); !doubt.empty()) {
-    frames.warnings.push_back(std::move(doubt));
-  }
 }
 
 Expected<FrameView> view_of(const Camera& camera, const fs::path& camera_file) {
@@ -134,7 +203,7 @@ Status add_view(FrameSource& frames,
   frames.mask = view.apply_to_mask(mask);
   frames.full_size = view.full_size();
   frames.camera = view.camera();
-  warn_of_camera(frames);
+  add_line(frames.warnings, doubt_of(frames.camera));
   frames.read = [view, read_whole = std::move(read_whole)](std::size_t index) {
     return read_whole(index).map(
         [&](const cv::Mat& image) { return image.empty() ? image : view.apply(image); });
@@ -179,6 +248,118 @@ Expected<SharedKind> vote_on_images(FrameSource& frames) {
                     levels.low, levels.high));
   }
   return SharedKind{most.size, most.is_color, levels};
+}
+
+Expected<PoseFile> read_truth(const fs::path& file, const std::optional<fs::path>& camera_file) {
+  Expected<PoseFile> result = read_pose_file(file);
+  if (!result || !result->is_of_body) {
+    return result;
+  }
+  const fs::path folder = absolute_folder(file.parent_path().empty() ? "." : file.parent_path());
+  const auto camera =
+      read_camera_file(camera_file.value_or(folder.parent_path() / "cam0/sensor.yaml"));
+  if (!camera || !camera->body_from_camera) {
+    return fail(fmt::format(
+        "{}: expected a camera file with T_BS, for these are poses of the body: --camera FILE, or "
+        "../cam0/sensor.yaml from there; found {}",
+        file.string(), camera ? "one without T_BS" : camera.error().message));
+  }
+  for (Rigid3& pose : result->poses) {
+    pose = pose * *camera->body_from_camera;
+  }
+  result->is_of_body = false;
+  return result;
+}
+
+Status check_pairs(const PoseFile& truth,
+                   const std::string& owner,
+                   std::span<const double> times_s,
+                   const TimePairs& pairs,
+                   double tolerance_s) {
+  constexpr std::size_t kMinPairs = 2;
+  if (pairs.first.size() >= kMinPairs) {
+    return {};
+  }
+  return fail(fmt::format(
+      "{}: expected at least {} poses within {} s of times in {}, found {}; poses are of {:.3f} to "
+      "{:.3f} s, the others of {:.3f} to {:.3f} s (see --gt-tolerance)",
+      truth.file.string(), kMinPairs, tolerance_s, owner, pairs.first.size(),
+      truth.timestamps_s.front(), truth.timestamps_s.back(), times_s.front(), times_s.back()));
+}
+
+Expected<GroundTruth> match_frames(const PoseFile& truth,
+                                   std::size_t begin,
+                                   const std::vector<double>& times_s,
+                                   double tolerance_s) {
+  if (!truth.timestamps_s.empty()) {
+    const TimePairs pairs = pair_by_time(times_s, truth.timestamps_s, tolerance_s);
+    STEMVO_TRY(check_pairs(truth, "the frames", times_s, pairs, tolerance_s));
+    return GroundTruth{relative_to_first(take_poses(truth.poses, pairs.second)), pairs.first};
+  }
+  if (truth.poses.size() < begin + times_s.size()) {
+    return fail(fmt::format("{}: expected a pose for each of {} frames, found {} poses",
+                            truth.file.string(), begin + times_s.size(), truth.poses.size()));
+  }
+  GroundTruth result{relative_to_first(std::span(truth.poses).subspan(begin, times_s.size())),
+                     std::vector<std::size_t>(times_s.size())};
+  std::iota(result.frames.begin(), result.frames.end(), std::size_t{0});
+  return result;
+}
+
+Expected<cv::Mat> make_mask(const std::vector<std::string>& parts, cv::Size size) {
+  if (parts.empty()) {
+    return cv::Mat();
+  }
+  cv::Mat mask(size, CV_8UC1, cv::Scalar(255));
+  for (const std::string& part : parts) {
+    STEMVO_TRY(add_part(part, mask));
+  }
+  if (cv::countNonZero(mask) == 0) {
+    return fail("--mask: expected a part of the frames that is left, found none");
+  }
+  return mask;
+}
+
+Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequest& request) {
+  const auto camera_path = request.camera_file ? request.camera_file : listing.camera_file;
+  if (!camera_path) {
+    return fail(
+        fmt::format("{}: a {}: expected --camera FILE or camera.yaml in it, found neither; "
+                    "'stemvo run --help' shows what it holds",
+                    request.sequence_dir.string(), listing.kind));
+  }
+  STEMVO_TRY_GET(const auto camera_file, read_camera_file(*camera_path));
+  STEMVO_TRY_GET(const auto range, resolve_range(request.frames, listing.files.size(),
+                                                 request.sequence_dir.string()));
+  STEMVO_TRY_GET(auto times, find_times(listing, request));
+  const bool has_times = !times.rows.empty();
+  times.rows.resize(listing.files.size());
+  FrameSource frames = list_frames(range, listing.files, times.rows);
+  frames.warnings = camera_file.warnings;
+  add_line(frames.notes, times.note);
+  if (!has_times) {
+    const double rate_hz = rate_of(camera_file, request, frames);
+    for (std::size_t i = 0; i < frames.timestamps_s.size(); ++i) {
+      frames.timestamps_s[i] = static_cast<double>(range.begin + i) / rate_hz;
+    }
+  }
+  if (const auto& truth = request.ground_truth ? request.ground_truth : listing.ground_truth) {
+    STEMVO_TRY(add_ground_truth(frames, *truth, camera_path, request.ground_truth_tolerance_s,
+                                listing.files.size(), true));
+  }
+  add_line(frames.warnings, listing.warning);
+  STEMVO_TRY_GET(const auto kind,
+                 check_images(frames, listing.folder, *camera_path, camera_file.camera));
+  STEMVO_TRY_GET(const auto view, view_of(camera_file.camera, *camera_path));
+  frames.kind = listing.kind;
+  frames.name = listing.name;
+  frames.given_calibration = camera_path;
+  frames.camera_height_m = camera_file.camera_height_m;
+  frames.camera_from_imu = camera_file.camera_from_imu();
+  STEMVO_TRY(add_view(frames, view, request.masks, [files = frames.files, kind](std::size_t i) {
+    return io::read_image(files[i], kind.is_color, kind.size, kind.levels);
+  }));
+  return frames;
 }
 
 }  // namespace stemvo::dataset

@@ -19,7 +19,9 @@
 #include "dataset/video_stream.hpp"
 #include "io/image_file.hpp"
 #include "odometry/frame_view.hpp"
+#include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
+#include "text/text_file.hpp"
 
 /// Parts that all frame sources share.
 namespace stemvo::dataset {
@@ -56,14 +58,10 @@ namespace stemvo::dataset {
                                       std::size_t num_files,
                                       bool is_exact);
 
-/// Adds a line for people, unless it is empty.
-void add_note(FrameSource& frames, const std::string& note);
 /// Frames per second without times: the camera file's, else those asked for, else 30, with a note.
 [[nodiscard]] double rate_of(const CameraFile& camera,
                              const FrameSourceRequest& request,
                              FrameSource& frames);
-/// Adds what is odd about its camera.
-void warn_of_camera(FrameSource& frames);
 
 /// Images that were listed; what the request names goes before what lies beside them.
 [[nodiscard]] Expected<FrameSource> open_listing(const Listing& listing,
@@ -81,9 +79,8 @@ void warn_of_camera(FrameSource& frames);
                                                 const CameraFile& camera,
                                                 const FrameSourceRequest& request);
 
-/// A line where frames are turned as the container asks; else none.
-[[nodiscard]] std::vector<std::string> warn_of_turn(const VideoStream& stream,
-                                                    const std::string& owner);
+/// A line where frames are turned as the container asks; else empty.
+[[nodiscard]] std::string warn_of_turn(const VideoStream& stream, const std::string& owner);
 
 /// Error, naming the camera file: that of FrameView::create.
 [[nodiscard]] Expected<FrameView> view_of(const Camera& camera,
@@ -132,5 +129,22 @@ struct SharedKind {
                                                  std::size_t begin,
                                                  const std::vector<double>& times_s,
                                                  double tolerance_s);
+
+/// Intrinsics of camera `index` (0..3) from its row `PN:` (odometry and object benchmarks) or
+/// `P_rect_0N:` (raw data): 12 numbers, row-major 3x4. The size of the image is left at zero.
+/// Errors: no such row; not 12 finite numbers; a focal length that is not positive; skew.
+[[nodiscard]] Expected<Camera> read_kitti_camera(const std::filesystem::path& file, int index);
+
+/// The text of a calib.txt with other intrinsics in every projection row whose intrinsics are
+/// `given`: rectified cameras share them. The row's offset to the first camera in metres,
+/// K^-1 p4, stays. Every other line is kept as it is. Error: the file cannot be read.
+[[nodiscard]] Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
+                                                         const Camera& given,
+                                                         const Camera& refined);
+
+/// One time per line, as read_timed_rows reads them, for at least `num_expected` images. Errors:
+/// not one finite number in a line, not increasing, fewer lines.
+[[nodiscard]] Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
+                                                           std::size_t num_expected);
 
 }  // namespace stemvo::dataset

@@ -11,7 +11,6 @@
 #include <opencv2/core.hpp>
 
 #include "config/config.hpp"
-#include "evaluation/pose_file.hpp"
 #include "evaluation/trajectory.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"

@@ -7,7 +7,6 @@
 
 #include "dataset/frame_files.hpp"
 #include "dataset/frame_source.hpp"
-#include "dataset/kitti_text.hpp"
 #include "io/image_file.hpp"
 #include "odometry/check_frame.hpp"
 #include "text/text_file.hpp"
@@ -92,7 +91,7 @@ Status set_images(const fs::path& calibration, bool is_color, FrameSource& frame
   frames.full_size = kind.size;
   frames.camera.width_px = kind.size.width;
   frames.camera.height_px = kind.size.height;
-  dataset::warn_of_camera(frames);
+  add_line(frames.warnings, doubt_of(frames.camera));
   frames.read = [files = frames.files, is_color, kind](std::size_t index) {
     return io::read_image(files[index], is_color, kind.size, kind.levels);
   };
@@ -126,7 +125,7 @@ Expected<FrameSource> open_kitti(const fs::path& directory, const SequenceOption
   STEMVO_TRY_GET(const auto times, dataset::read_kitti_times(directory / "times.txt", range.end));
   const fs::path absolute = dataset::absolute_folder(directory);
   FrameSource frames = dataset::list_frames(range, images, times.rows);
-  dataset::add_note(frames, times.note);
+  add_line(frames.notes, times.note);
   frames.kind = "KITTI sequence";
   frames.is_kitti = true;
   frames.name = absolute.filename().string();

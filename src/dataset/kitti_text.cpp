@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "dataset/kitti_text.hpp"
-
 #include <cmath>
 #include <optional>
 #include <string_view>
@@ -8,6 +6,7 @@
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
+#include "dataset/frame_files.hpp"
 #include "stemvo/rigid3.hpp"
 #include "text/text_file.hpp"
 #include "try.hpp"

@@ -1,16 +1,28 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/listing.hpp"
 
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <set>
+#include <string>
 #include <system_error>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fnmatch.h>
 
 #include "dataset/frame_files.hpp"
 #include "text/text_file.hpp"
 #include "try.hpp"
 
 namespace stemvo::dataset {
-namespace {
 
 namespace fs = std::filesystem;
+
+namespace {
 
 bool is_there(const fs::path& file) {
   std::error_code code;
@@ -80,6 +92,131 @@ Expected<Listing> list_own(const fs::path& folder) {
   return listing;
 }
 
+constexpr std::string_view kDigitCharacters = "0123456789";
+
+/// Each whole number becomes '0', the number of its digits without leading zeros, and these
+/// digits: compared as text, it is compared by its value.
+std::string sort_key(std::string_view name) {
+  std::string key;
+  while (!name.empty()) {
+    const std::size_t length = std::min(name.find_first_not_of(kDigitCharacters), name.size());
+    if (length == 0) {
+      key += name.front();
+      name.remove_prefix(1);
+      continue;
+    }
+    std::string_view number = name.substr(0, length);
+    number.remove_prefix(std::min(number.find_first_not_of('0'), length));
+    key += '0';
+    key += static_cast<char>(number.size());  // names have at most 255 characters
+    key += number;
+    name.remove_prefix(length);
+  }
+  return key;
+}
+
+/// "_left" of "left_*.png"; nothing of "*.png", which is all of a folder.
+std::string name_part(const std::string& pattern) {
+  std::string part = fs::path(pattern).stem().string();
+  std::erase_if(part, [](unsigned char c) { return std::isalnum(c) == 0 && c != '_' && c != '-'; });
+  part = part.substr(0, part.find_last_not_of("_-") + 1);
+  return part.empty() ? "" : (part.find_first_of("_-") == 0 ? "" : "_") + part;
+}
+
+/// The numbers in a name, without leading zeros: of "left_007.png" those of "right_007.jpg".
+std::string numbers_of(const fs::path& file) {
+  const std::string stem = file.stem().string();
+  std::string numbers;
+  for (std::size_t i = stem.find_first_of(kDigitCharacters); i < stem.size();) {
+    const std::size_t end = std::min(stem.find_first_not_of(kDigitCharacters, i), stem.size());
+    i = std::min(stem.find_first_not_of('0', i), end - 1);  // a zero alone stays
+    numbers += stem.substr(i, end - i) + ' ';
+    i = stem.find_first_of(kDigitCharacters, end);
+  }
+  return numbers;
+}
+
+/// A name around its last number: "cam1_", "7" and "" of "cam1_007.png".
+struct NameParts {
+  std::string before;
+  std::string number;  ///< without leading zeros; a decimal one between _ or -: "0.033"
+  std::string behind;
+};
+
+NameParts parts_of(const fs::path& file) {
+  const std::string stem = file.stem().string();
+  const auto start_of = [&](std::size_t end) {
+    return end == 0 ? 0 : stem.find_last_not_of(kDigitCharacters, end - 1) + 1;
+  };
+  const std::size_t end = stem.find_last_of(kDigitCharacters) + 1;
+  std::size_t start = start_of(end);
+  if (start > 1 && stem[start - 1] == '.') {
+    const std::size_t whole = start_of(start - 1);
+    const bool is_apart = whole == 0 || stem[whole - 1] == '_' || stem[whole - 1] == '-';
+    start = whole < start - 1 && is_apart ? whole : start;
+  }
+  const std::string number = stem.substr(start, end - start);
+  return {stem.substr(0, start),
+          number.substr(std::min(number.find_first_not_of('0'), number.size())), stem.substr(end)};
+}
+
+/// The error that two images may be of one time, with a pattern that tells the first from the
+/// other.
+Error one_time(const fs::path& given, const fs::path& file, const fs::path& other) {
+  const NameParts parts = parts_of(file);
+  const NameParts others = parts_of(other);
+  const bool is_named_alike = parts.before == others.before && parts.behind == others.behind;
+  const std::string pattern = is_named_alike
+                                  ? "*" + other.extension().string()
+                                  : parts.before + "*" + parts.behind + file.extension().string();
+  return fail(fmt::format(
+      "{}: expected one image of each number, found {} and {}; a quoted pattern tells which, "
+      "as '{}'",
+      given.string(), file.filename().string(), other.filename().string(),
+      (file.parent_path() / pattern).string()));
+}
+
+/// Error: two images of one number, which are two cameras or one picture twice; or names with the
+/// same last numbers behind several beginnings (cam1_, cam2_), which are as many cameras. Where
+/// there are more beginnings than numbers, they are hours or seconds.
+Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) {
+  struct Group {
+    std::set<std::string> numbers;
+    fs::path first;
+  };
+  std::map<std::string, fs::path> seen;
+  std::map<std::pair<std::string, std::string>, Group> groups;
+  for (const fs::path& file : files) {
+    const std::string numbers = numbers_of(file);
+    const auto [other, is_new] = seen.emplace(numbers, file);
+    if (!is_new && !numbers.empty()) {
+      return one_time(given, other->second, file);
+    }
+    const NameParts parts = parts_of(file);
+    Group& group = groups[{parts.before, parts.behind}];
+    group.first = group.numbers.empty() ? file : group.first;
+    group.numbers.insert(parts.number);
+  }
+  std::map<std::set<std::string>, std::vector<fs::path>> cameras;
+  for (const auto& [name, group] : groups) {
+    cameras[group.numbers].push_back(group.first);
+  }
+  for (const auto& [numbers, firsts] : cameras) {
+    if (firsts.size() > 1 && numbers.size() >= firsts.size() && numbers.size() > 1) {
+      return one_time(given, firsts[0], firsts[1]);
+    }
+  }
+  return {};
+}
+
+bool has_image_name(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return !file.filename().string().starts_with('.') &&
+         (extension == ".png" || extension == ".jpg" || extension == ".jpeg");
+}
+
 }  // namespace
 
 std::optional<Expected<Listing>> find_listing(const fs::path& folder) {
@@ -92,6 +229,64 @@ std::optional<Expected<Listing>> find_listing(const fs::path& folder) {
   // A folder in KITTI's layout stays one beside a camera.yaml for its images alone.
   const bool is_ours = is_there(folder / "camera.yaml") && !is_there(folder / "calib.txt");
   return is_ours ? std::optional(list_own(folder)) : std::nullopt;
+}
+
+bool comes_before(std::string_view a, std::string_view b) {
+  return std::make_tuple(sort_key(a), a) < std::make_tuple(sort_key(b), b);
+}
+
+bool matches_pattern(const std::string& name, const std::string& pattern) {
+  return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
+}
+
+bool is_image_file(const fs::path& file) {
+  std::error_code code;
+  return has_image_name(file) && fs::is_regular_file(file, code);
+}
+
+bool is_pattern(const fs::path& path) {
+  std::error_code code;
+  return path.string().find_first_of("*?[") != std::string::npos && !fs::exists(path, code);
+}
+
+Expected<Listing> list_images(const fs::path& given) {
+  Listing result{.kind = "images", .folder = given, .name = {}, .files = {}};
+  std::string pattern = "*";
+  if (is_pattern(given)) {
+    result.folder = given.has_parent_path() ? given.parent_path() : fs::path(".");
+    pattern = given.filename().string();
+  }
+  if (is_pattern(result.folder)) {
+    return fail(fmt::format("{}: expected *, ? and [..] in the last part only, found them in '{}'",
+                            given.string(), result.folder.string()));
+  }
+  if (!is_folder(result.folder)) {
+    return fail(
+        fmt::format("{}: expected a folder of images or a pattern with *, ? or [..], found none",
+                    result.folder.string()));
+  }
+  STEMVO_TRY_GET(const auto found, list_folder(result.folder));
+  for (const fs::path& file : found) {
+    if (has_image_name(file) && matches_pattern(file.filename().string(), pattern) &&
+        !is_folder(file)) {
+      result.files.push_back(file);
+    }
+  }
+  if (result.files.empty()) {
+    return fail(fmt::format("{}: expected images (.png, .jpg, .jpeg), found none; check the path",
+                            given.string()));
+  }
+  std::sort(result.files.begin(), result.files.end(), [](const fs::path& a, const fs::path& b) {
+    return comes_before(a.filename().string(), b.filename().string());
+  });
+  if (const Status single = check_numbers(result.files, given); !single) {
+    if (pattern == "*") {
+      return single.error();
+    }
+    result.warning = single.error().message;  // who gave a pattern may mean both
+  }
+  result.name = recording_name(result.folder) + name_part(pattern);
+  return result;
 }
 
 }  // namespace stemvo::dataset

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "evaluation/pose_file.hpp"
+#include "evaluation/trajectory.hpp"
 #include "geometry/degrees.hpp"
 #include "internal_check.hpp"
 

@@ -1,19 +1,219 @@
 // SPDX-License-Identifier: MIT
 #include "evaluation/trajectory.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <iterator>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <string_view>
 
 #include <fmt/core.h>
+#include <fmt/format.h>
 
 #include "internal_check.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo {
+
+namespace fs = std::filesystem;
 
 namespace {
 
 /// Shorter steps have no direction: what is left of them is rounding.
 constexpr double kNoStep_m = 1e-9;
+
+enum class Format { kKitti, kTum, kEuroc };
+
+std::string with_blanks(std::string_view line) {
+  std::string text(line);
+  std::ranges::replace(text, ',', ' ');
+  return text;
+}
+
+bool is_blank(std::string_view line) { return take_word(line).empty(); }
+
+/// The format of a first row whose numbers stand between commas. Nullopt: two formats' rows look
+/// so.
+std::optional<Format> format_of_commas(std::string_view row, bool says_nanoseconds) {
+  constexpr double kNanoseconds = 1e12;  // as seconds, 30,000 years
+  const std::vector<std::string_view> words = split_words(row);
+  if (words.size() == 12) {
+    return Format::kKitti;
+  }
+  const auto time = parse_numbers(words.empty() ? "" : words.front(), 1);
+  const bool is_long = time && time->front() > kNanoseconds;
+  if (words.size() == 8 && !says_nanoseconds) {
+    return is_long ? std::nullopt : std::optional(Format::kTum);
+  }
+  return Format::kEuroc;
+}
+
+std::optional<Format> format_of(std::string_view text) {
+  bool has_comment = false;  // KITTI's have none
+  bool says_nanoseconds = false;
+  for (const std::string_view line : split_lines(text)) {
+    std::string_view rest = line;
+    const std::string_view first = take_word(rest);
+    const bool is_comment = first.starts_with('#');
+    has_comment = has_comment || is_comment;
+    says_nanoseconds =
+        says_nanoseconds || (is_comment && line.find("[ns]") != std::string_view::npos);
+    if (!first.empty() && !is_comment) {
+      return line.find(',') != std::string_view::npos
+                 ? format_of_commas(with_blanks(line), says_nanoseconds)
+             : has_comment || split_words(line).size() == 8 ? Format::kTum
+                                                            : Format::kKitti;
+    }
+  }
+  return has_comment ? Format::kTum : Format::kKitti;
+}
+
+/// A row: the time in whatever unit, none of KITTI's.
+struct TimedPose {
+  double time = 0.0;
+  Rigid3 pose;
+};
+
+/// Entries of R^T R, or the length of a quaternion, may differ this much from the exact ones.
+constexpr double kRotationTolerance = 1e-3;
+
+Expected<TimedPose> pose_from_matrix_row(const std::vector<double>& numbers) {
+  const Matrix34d matrix =
+      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
+  const Eigen::Matrix3d rotation = matrix.leftCols<3>();
+  const double deviation =
+      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(deviation <= kRotationTolerance)) {
+    return fail(fmt::format(
+        "expected a rotation in the first three columns, found R^T R off the identity by {:.3g}",
+        deviation));
+  }
+  if (rotation.determinant() < 0.0) {
+    return fail("expected a rotation in the first three columns, found a reflection");
+  }
+  return TimedPose{0.0, Rigid3::from_matrix(matrix)};
+}
+
+Expected<TimedPose> pose_from_quaternion_row(const std::vector<double>& n) {
+  const Eigen::Quaterniond rotation(n[7], n[4], n[5], n[6]);
+  if (!(std::abs(rotation.norm() - 1.0) <= kRotationTolerance)) {
+    return fail(
+        fmt::format("expected a quaternion of length 1 in the last four numbers, found {:.6g}",
+                    rotation.norm()));
+  }
+  return TimedPose{n[0], Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3]))};
+}
+
+/// The columns of the pose as a row of TUM's, whose quaternion ends with w. Those behind it
+/// (velocity, biases) are not read.
+Expected<std::string> to_tum_row(std::string_view line) {
+  const std::vector<std::string_view> words = split_words(line);
+  if (words.size() < 8) {
+    return fail(
+        fmt::format("expected time, x, y, z, qw, qx, qy, qz, .., found {} numbers", words.size()));
+  }
+  return fmt::format("{} {} {} {} {} {} {} {}", words[0], words[1], words[2], words[3], words[5],
+                     words[6], words[7], words[4]);
+}
+
+Expected<TimedPose> parse_row(Format format, std::string_view given) {
+  // Fewer commas are those of decimals.
+  const bool has_commas = format != Format::kKitti || std::ranges::count(given, ',') == 11;
+  const std::string line = has_commas ? with_blanks(given) : std::string(given);
+  if (format == Format::kKitti) {
+    return parse_numbers(line, 12).and_then(pose_from_matrix_row);
+  }
+  return (format == Format::kEuroc
+              ? to_tum_row(line).and_then([](const auto& row) { return parse_numbers(row, 8); })
+              : parse_numbers(line, 8))
+      .and_then(pose_from_quaternion_row);
+}
+
+Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Format format) {
+  const double unit_s = format == Format::kEuroc ? 1e-9 : 1.0;
+  std::vector<std::string_view> lines = split_lines(text);
+  // Empty lines at the end of a file are no poses; within KITTI's they would shift the frames.
+  while (!lines.empty() && is_blank(lines.back())) {
+    lines.pop_back();
+  }
+  PoseFile result{.file = file, .is_of_body = format == Format::kEuroc};
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const std::string_view line =
+        format == Format::kKitti ? lines[i] : lines[i].substr(0, lines[i].find('#'));
+    if (format != Format::kKitti && is_blank(line)) {
+      continue;
+    }
+    const Expected<TimedPose> row = parse_row(format, line);
+    if (!row) {
+      return fail_at(file, i, row.error());
+    }
+    result.poses.push_back(row->pose);
+    if (format != Format::kKitti) {
+      result.timestamps_s.push_back(unit_s * row->time);
+    }
+  }
+  if (result.poses.empty()) {
+    return fail(fmt::format("{}: expected at least one pose, found none", file.string()));
+  }
+  return result;
+}
+
+/// Files that were put together by hand are not always in order.
+void sort_by_time(PoseFile& file) {
+  std::vector<double>& times_s = file.timestamps_s;
+  if (std::is_sorted(times_s.begin(), times_s.end())) {
+    return;
+  }
+  std::vector<std::size_t> order(times_s.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return times_s[a] < times_s[b]; });
+  file.poses = take_poses(file.poses, order);
+  std::sort(times_s.begin(), times_s.end());
+}
+
+Error either_format(const fs::path& file, std::string_view found) {
+  return fail(fmt::format(
+      "{}: expected TUM's rows (seconds, x, y, z, qx, qy, qz, qw) or EuRoC's (nanoseconds, x, y, "
+      "z, qw, qx, qy, qz, .., under a comment with [ns]), found {}",
+      file.string(), found));
+}
+
+/// Error: the usual step of times in order can be none in the format's unit.
+Status check_steps(const fs::path& file, Format format, const std::vector<double>& times_s) {
+  constexpr double kLongest_s = 1e5;
+  constexpr double kShortest_s = 1e-4;
+  if (times_s.size() < 2) {
+    return {};
+  }
+  const double step_s =
+      (times_s.back() - times_s.front()) / static_cast<double>(times_s.size() - 1);
+  if (format == Format::kTum && step_s > kLongest_s) {
+    return either_format(file, fmt::format("times with steps of {:.4g}", step_s));
+  }
+  if (format == Format::kEuroc && step_s < kShortest_s) {
+    return fail(fmt::format(
+        "{}: taken for EuRoC's rows (nanoseconds, x, y, z, qw, qx, qy, qz, ..): expected times in "
+        "nanoseconds, found steps of {:.4g}; TUM's rows (seconds, x, y, z, qx, qy, qz, qw) have 8 "
+        "numbers",
+        file.string(), step_s / 1e-9));
+  }
+  return {};
+}
+
+/// The index of the nearest time of a list in order that is not empty; of equals the first.
+std::size_t nearest(std::span<const double> times_s, double time_s) {
+  const auto above = std::lower_bound(times_s.begin(), times_s.end(), time_s);
+  const auto index = static_cast<std::size_t>(above - times_s.begin());
+  if (index == times_s.size()) {
+    return nearest(times_s, times_s.back());
+  }
+  const bool is_below_nearer = index > 0 && time_s - times_s[index - 1] < times_s[index] - time_s;
+  return is_below_nearer ? nearest(times_s, times_s[index - 1]) : index;
+}
 
 }  // namespace
 
@@ -88,6 +288,50 @@ Status write_tum_trajectory(const std::filesystem::path& file,
     text += tum_row(timestamps_s[i], world_from_camera[i]);
   }
   return write_text_file(file, text);
+}
+
+Expected<Trajectory> read_kitti_trajectory(const fs::path& file) {
+  return read_text_file(file)
+      .and_then([&](const std::string& text) { return parse_rows(file, text, Format::kKitti); })
+      .map([](const PoseFile& read) { return read.poses; });
+}
+
+Expected<PoseFile> read_pose_file(const fs::path& file) {
+  STEMVO_TRY_GET(const std::string text, read_text_file(file));
+  const std::optional<Format> format = format_of(text);
+  if (!format) {
+    return either_format(file, "8 numbers that begin with nanoseconds");
+  }
+  Expected<PoseFile> result = parse_rows(file, text, *format);
+  if (result) {
+    sort_by_time(*result);
+    STEMVO_TRY(check_steps(file, *format, result->timestamps_s));
+  }
+  return result;
+}
+
+TimePairs pair_by_time(std::span<const double> first_s,
+                       std::span<const double> second_s,
+                       double tolerance_s) {
+  TimePairs pairs;
+  for (std::size_t i = 0; i < first_s.size() && !second_s.empty(); ++i) {
+    const std::size_t partner = nearest(second_s, first_s[i]);
+    const bool is_near = std::abs(second_s[partner] - first_s[i]) <= tolerance_s;
+    if (is_near && nearest(first_s, second_s[partner]) == i) {
+      pairs.first.push_back(i);
+      pairs.second.push_back(partner);
+    }
+  }
+  return pairs;
+}
+
+Trajectory take_poses(std::span<const Rigid3> poses, std::span<const std::size_t> indices) {
+  Trajectory taken;
+  taken.reserve(indices.size());
+  for (const std::size_t index : indices) {
+    taken.push_back(poses[index]);
+  }
+  return taken;
 }
 
 }  // namespace stemvo

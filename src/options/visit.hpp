@@ -65,6 +65,8 @@ inline constexpr std::array<std::string_view, 3> kNames<RoadEstimators>{"both", 
 
 template <typename T>
 concept Enumeration = std::is_enum_v<T>;
+template <typename T>
+concept Number = std::is_arithmetic_v<T> && !std::is_same_v<T, bool>;
 
 template <Enumeration Enum>
 [[nodiscard]] std::string_view to_string(Enum value) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <chrono>
@@ -9,6 +10,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
 
 #include "evaluation/trajectory.hpp"
 #include "pipeline/frame_pipeline.hpp"
@@ -16,8 +18,10 @@
 #include "report/frame_image.hpp"
 #include "report/frames_csv.hpp"
 #include "timing/stage_timer.hpp"
+#include "try.hpp"
 
 namespace stemvo::pipeline {
+
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -216,10 +220,56 @@ class DriveLoop {
   bool has_scale_ = false;  ///< lengths of the path are metres
 };
 
+/// Frames a second of one video, whatever gaps the recording has.
+double rate_of(const FrameSource& sequence) {
+  const auto& times_s = sequence.timestamps_s;
+  const double rate_hz = sequence.stream      ? sequence.stream->rate_hz
+                         : times_s.size() > 1 ? static_cast<double>(times_s.size() - 1) /
+                                                    (times_s.back() - times_s.front())
+                                              : 0.0;
+  return std::clamp(rate_hz, 1.0, 240.0);
+}
+
 }  // namespace
 
 Drive run_drive(const Run& run, const RunProgress& progress) {
   return DriveLoop(run, progress).drive();
+}
+
+Expected<DriveVideo> DriveVideo::create(const RunRequest& request, const FrameSource& sequence) {
+  DriveVideo video;
+  if (request.video) {
+    const Camera& camera = sequence.camera;
+    const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC3);
+    const cv::Size size = draw_under_caption(blank, "", "").size();
+    video.file_ = request.video->string();
+    video.size_ = {(size.width + size.height) & ~1, size.height & ~1};  // as encoders want them
+    STEMVO_TRY_GET(video.write_,
+                   dataset::encode_file(*request.video, rate_of(sequence), video.size_));
+  }
+  return video;
+}
+
+void DriveVideo::add(const cv::Mat& image, const Trajectory& path, const std::string& unit) const {
+  // Each frame draws the path anew: of a long drive few poses, or it takes longer and longer.
+  constexpr std::size_t kMaxPoses = 2000;
+  const std::size_t step = std::bit_ceil(path.size() / kMaxPoses + 1);
+  Trajectory drawn;
+  for (std::size_t i = 0; i + 1 < path.size(); i += step) {
+    drawn.push_back(path[i]);
+  }
+  drawn.push_back(path.back());
+  cv::Mat frame;
+  cv::hconcat(image, draw_path(drawn, image.rows, unit), frame);
+  cv::cvtColor(frame, frame, cv::COLOR_RGB2BGR);
+  write_(frame(cv::Rect({0, 0}, size_)));
+}
+
+Status DriveVideo::finish() const {
+  return !is_on() || write_({}) ? Status()
+                                : fail(fmt::format("{}: expected a video with all frames, found it "
+                                                   "cut off: is the disk full?",
+                                                   file_));
 }
 
 }  // namespace stemvo::pipeline

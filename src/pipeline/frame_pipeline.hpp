@@ -3,16 +3,47 @@
 
 #include <cstddef>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include <opencv2/core.hpp>
+#include <opencv2/core/utility.hpp>
+#include <tbb/global_control.h>
 
 #include "config/config.hpp"
 #include "dataset/frame_source.hpp"
+#include "dataset/motion_file.hpp"
 #include "odometry/phased_odometry.hpp"
-#include "pipeline/beside_frames.hpp"
+#include "odometry/way.hpp"
+#include "pipeline/run.hpp"
 #include "stemvo/error.hpp"
+#include "stemvo/odometry.hpp"
 
 namespace stemvo::pipeline {
+
+/// Facts on a recording's motion beside its frames.
+struct BesideFrames {
+  std::vector<Way> ways;                ///< by speeds
+  std::vector<dataset::GyroRow> gyro;   ///< in the camera's axes
+  std::string note;                     ///< what there is, for the line of the input; may be empty
+  std::vector<std::string> unit_notes;  ///< how times were read, a line each; may be empty
+  struct Span {
+    std::string option;
+    double first_s;
+    double last_s;
+  };
+  std::vector<Span> spans;  ///< of the files read
+
+  /// For the frame of this time, behind one of that time.
+  [[nodiscard]] FrameHints hints(double last_s, double time_s) const;
+  /// A line for each file whose times are all before or all behind those of the frames.
+  [[nodiscard]] std::vector<std::string> warnings(double first_s, double last_s) const;
+};
+
+/// Reads the files that were asked for. Errors: theirs; speeds beside a scale.source that leaves no
+/// room for them.
+[[nodiscard]] Expected<BesideFrames> read_beside_frames(const RunRequest& request,
+                                                        const FrameSource& sequence);
 
 /// Called for each frame, in order, one call at a time, maybe from another thread, while the
 /// odometry holds what it knows of this frame. `index` counts from 0; `frame` is the image or
@@ -27,5 +58,25 @@ void run_frames(const FrameSource& sequence,
                 PhasedOdometry& odometry,
                 const FrameVisitor& visit,
                 const BesideFrames& beside = {});
+
+/// While it lives, OpenCV works on `num_threads` threads (0: one per core) in the whole process:
+/// the program's part of --threads. The library leaves OpenCV alone.
+class ThreadScope {
+ public:
+  explicit ThreadScope(int num_threads)
+      : num_threads_(num_threads > 0 ? num_threads : cv::getNumberOfCPUs()) {
+    cv::setNumThreads(num_threads_);
+  }
+  ~ThreadScope() { cv::setNumThreads(opencv_before_); }
+  ThreadScope(const ThreadScope&) = delete;
+  ThreadScope& operator=(const ThreadScope&) = delete;
+
+ private:
+  int num_threads_;
+  int opencv_before_ = cv::getNumThreads();
+  /// Limits OpenCV's threads where it is built with TBB.
+  tbb::global_control limit_{tbb::global_control::max_allowed_parallelism,
+                             static_cast<std::size_t>(num_threads_)};
+};
 
 }  // namespace stemvo::pipeline

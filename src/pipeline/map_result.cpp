@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "pipeline/map_result.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <span>
 
 #include "geometry/median.hpp"
+#include "pipeline/result_files.hpp"
 #include "report/map_ply.hpp"
 
 namespace stemvo::pipeline {

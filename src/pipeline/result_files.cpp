@@ -11,12 +11,10 @@
 
 #include "geometry/degrees.hpp"
 #include "options/visit.hpp"
-#include "pipeline/map_result.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/frame_image.hpp"
 #include "report/frames_csv.hpp"
 #include "report/run_page.hpp"
-#include "report/trajectory_plot.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"

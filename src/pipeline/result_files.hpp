@@ -3,20 +3,44 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include <opencv2/core.hpp>
+
 #include "dataset/frame_source.hpp"
+#include "dataset/video_decoder.hpp"
 #include "evaluation/trajectory.hpp"
 #include "html/page.hpp"
 #include "odometry/phased_odometry.hpp"
-#include "pipeline/beside_frames.hpp"
-#include "pipeline/drive_video.hpp"
+#include "odometry/whole_map.hpp"
+#include "pipeline/frame_pipeline.hpp"
 #include "pipeline/run.hpp"
 #include "report/run_page.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::pipeline {
+
+/// The video of a run: each frame with its tracks, and beside it the path so far.
+class DriveVideo {
+ public:
+  /// Writes RunRequest::video; without it nothing. Errors: those of dataset::encode_file.
+  [[nodiscard]] static Expected<DriveVideo> create(const RunRequest& request,
+                                                   const FrameSource& sequence);
+
+  [[nodiscard]] bool is_on() const { return write_ != nullptr; }
+  /// `image`: RGB, of the frames' size under a caption. `unit`: of the path's lengths.
+  void add(const cv::Mat& image, const Trajectory& path, const std::string& unit) const;
+  /// Behind the last frame. Error: the file is not whole.
+  [[nodiscard]] Status finish() const;
+
+ private:
+  std::string file_;
+  cv::Size size_;
+  dataset::WriteFrame write_;
+};
 
 /// Files that a run writes into its folder, beside pictures/.
 inline constexpr std::array kResultNames = {"config.yaml",
@@ -74,5 +98,22 @@ void keep_first(Status& first, Status next);
 /// trajectory.png, metrics.json, report.html; mode map: map.ply and, with loops,
 /// trajectory_map_kitti.txt, trajectory_map_tum.txt and the map to be saved.
 [[nodiscard]] Status write_results(const Run& run, const Drive& drive, MetricsReport& report);
+
+/// The map of a run that is over.
+struct MapResult {
+  WholeMap whole;
+  Trajectory trajectory;                              ///< of all frames, as result files hold it
+  std::optional<double> adjustment_s = std::nullopt;  ///< it took
+};
+
+/// Takes in what the run remembers, adjusted where places were seen again, or where that is asked
+/// for; with scale.source=ground_truth steps get their true length.
+[[nodiscard]] MapResult finish_map(const Run& run);
+
+/// Pairs of frames of this run that show one place.
+[[nodiscard]] std::vector<std::pair<std::size_t, std::size_t>> loops_of(const KeptMap& map);
+
+/// map.ply: landmarks and the camera's path among them. Where steps are rescaled, both are.
+[[nodiscard]] Status write_map_ply(const Run& run, const MapResult& map);
 
 }  // namespace stemvo::pipeline

@@ -11,7 +11,6 @@
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
-#include "pipeline/thread_scope.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
 #include "try.hpp"
@@ -136,12 +135,10 @@ Expected<RunSummary> finish_run(const Run& run, const RunProgress& progress) {
   done.warnings.insert(done.warnings.begin(), odd.begin(), odd.end());
   MetricsReport report;
   Status written = pipeline::write_results(run, done, report);
-  if (std::string warning = warn_of_road(report); !warning.empty()) {
-    done.warnings.push_back(std::move(warning));
-  }
-  for (std::string& warning :
+  add_line(done.warnings, warn_of_road(report));
+  for (const std::string& warning :
        run.beside.warnings(done.frames.front().time_s, done.frames.back().time_s)) {
-    done.warnings.push_back(std::move(warning));
+    done.warnings.push_back(warning);
   }
   return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,
                     std::move(written)};

@@ -12,7 +12,7 @@
 
 #include "dataset/frame_source.hpp"
 #include "evaluation/metrics.hpp"
-#include "evaluation/pose_file.hpp"
+#include "evaluation/trajectory.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo {

@@ -1,17 +1,120 @@
 // SPDX-License-Identifier: MIT
 #include "report/metrics_json.hpp"
 
+#include <utility>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "report/evaluate_report.hpp"
 #include "text/text_file.hpp"
+#include "text/text_table.hpp"
 #include "try.hpp"
 
 namespace stemvo {
+
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr double kInPlace = 0.95;  ///< a larger share of such frames is told
+
+std::string scale_explained(const MetricsReport& report) {
+  const std::string& source = report.scale_source;
+  const std::string shown = source == "none" ? source : source + ", no road believed";
+  if (report.is_up_to_scale() && report.metrics) {
+    return shown + " (files: up to scale; here: fitted to the true metres)";
+  }
+  return source == "ground_truth"     ? source + " (each step rescaled to its true length)"
+         : source == "constant_speed" ? source + " (every step the same length: not metric)"
+         : report.is_up_to_scale()    ? shown + " (up to scale: units, not metres)"
+                                      : source;
+}
+
+std::string head(const MetricsReport& report) {
+  TextTable table("ll");
+  const std::size_t end = report.first_frame + report.num_frames;
+  table.add({"sequence", fmt::format("{}, {} frames ({}:{})", report.sequence, report.num_frames,
+                                     report.first_frame, end)});
+  table.add({"model", fmt::format("{}, filter {}", report.model, report.filter)});
+  table.add({"scale", scale_explained(report)});
+  table.add({"speed", fmt::format("{:.1f} frames/s", report.fps)});
+  table.add({"tracked", fmt::format("{:.1f} % of the frames have a measured pose",
+                                    100.0 * report.tracked_fraction)});
+  if (report.in_place_fraction > kInPlace) {
+    table.add(
+        {"motion",
+         fmt::format("hardly any ({:.1f} % of the frames in place): lengths and % mean little",
+                     100.0 * report.in_place_fraction)});
+  }
+  if (const auto& sigma = report.camera.sigma) {
+    const Camera& camera = report.camera.camera;
+    table.add(
+        {"camera", fmt::format("principal point {:.1f}, {:.1f} px, known to {:.1f}, {:.1f} px",
+                               camera.cx_px, camera.cy_px, sigma->cx_px, sigma->cy_px)});
+    table.add({"", fmt::format("focal length {:.1f} px, known to {:.1f} px", camera.fx_px,
+                               sigma->fx_px)});
+  }
+  if (report.road_measured_fraction) {
+    table.add({"road", fmt::format("measured on {:.1f} % of the frames, believed on {:.1f} %",
+                                   100.0 * *report.road_measured_fraction,
+                                   100.0 * report.road_believed_fraction.value_or(0.0))});
+  }
+  if (report.map) {
+    const MapReport& map = *report.map;
+    const std::string adjusted =
+        map.adjustment_s ? fmt::format(", adjusted in {:.1f} s", *map.adjustment_s) : "";
+    table.add({"map", fmt::format("{} keyframes, {} loops, {} relocalizations{}", map.num_keyframes,
+                                  map.num_loops, map.num_relocalizations, adjusted)});
+  }
+  if (report.metrics) {
+    table.add({"path", format_length(report.metrics->path_length_m, 1) + " m (ground truth)"});
+  }
+  return table.str();
+}
+
+std::string error_table(const MetricsReport& report) {
+  const Metrics& m = *report.metrics;
+  const std::string segments = m.num_segments == 0
+                                   ? fmt::format(
+                                         "no segment of {} fits into {:.1f} m: see "
+                                         "evaluation.segment_lengths_m",
+                                         length_range(m.segment_lengths_m), m.path_length_m)
+                                   : fmt::format("mean over {} segments of {}", m.num_segments,
+                                                 length_range(m.segment_lengths_m));
+  const std::string fitted(to_string(m.alignment));
+  struct Row {
+    std::string error, unit, alignment, note;
+  };
+  const Row rows[] = {
+      {"translation t_rel", "%", fitted, segments},
+      {"rotation r_rel", "deg/100 m", fitted, "the same segments"},
+      {"average offset", "m", fitted, "mean of |dx| + |dz|"},
+      {"  of zero motion", "m", "none", "the same for a camera that stays at the start"},
+      {"position ATE", "m", "none", "root mean square position error"},
+      {"position ATE", "m", "scale", "one scale fitted"},
+      {"position ATE", "m", "se3", "rotation and shift fitted"},
+      {"position ATE", "m", "sim3", "rotation, shift and scale fitted"},
+      {"translation per frame", "m", fitted, "mean over steps of one frame (RPE)"},
+      {"rotation per frame", "deg", fitted, "the same steps"}};
+  const auto in_map = report.map ? report.map->metrics : std::nullopt;
+  TextTable table(in_map ? "lrrlll" : "lrlll");
+  const auto add = [&](const Row& row, const std::string& value, const std::string& map) {
+    table.add(in_map ? std::vector{row.error, value, map, row.unit, row.alignment, row.note}
+                     : std::vector{row.error, value, row.unit, row.alignment, row.note});
+  };
+  add({"error", "unit", "alignment", ""}, "value", "map");
+  table.rule();
+  const auto values = metric_texts(m);
+  const auto map_values = metric_texts(in_map.value_or(m));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool is_unscaled = i == kAteText || i == kAteText + 2;
+    if (!report.is_up_to_scale() || !is_unscaled) {  // else units against metres
+      add(rows[i], values[i], map_values[i]);
+    }
+  }
+  return table.str();
+}
 
 }  // namespace
 
@@ -119,6 +222,61 @@ Json metrics_document(const MetricsReport& report) {
 
 Status write_metrics_json(const std::filesystem::path& file, const MetricsReport& report) {
   return write_text_file(file, to_text(metrics_document(report)));
+}
+
+std::array<std::string, 10> metric_texts(const Metrics& metrics) {
+  const auto& ate = metrics.ate_rmse;
+  return {number_or_dash(metrics.t_rel_percent, 2),
+          number_or_dash(metrics.r_rel_deg_per_100m, 3),
+          format_length(metrics.average_offset_m, 2),
+          format_length(metrics.null_offset_m, 2),
+          format_length(ate.none_m, 2),
+          format_length(ate.scale_m, 2),
+          format_length(ate.se3_m, 2),
+          format_length(ate.sim3_m, 2),
+          fmt::format("{:.4f}", metrics.rpe_translation_m),
+          fmt::format("{:.4f}", metrics.rpe_rotation_deg)};
+}
+
+std::string warn_of_road(const MetricsReport& report) {
+  const double share = report.road_believed_fraction.value_or(1.0);
+  return share == 0.0 ? "scale: no road was believed at scale.camera_height_m below the camera; "
+                        "the path is in units, not metres"
+         : share < kFewBelieved
+             ? fmt::format(
+                   "scale: a road was believed on {:.1f} % of the frames only; the others' "
+                   "lengths are a guess (scale_state in frames.csv)",
+                   100.0 * share)
+             : "";
+}
+
+std::string format_metrics_table(const MetricsReport& report) {
+  if (!report.metrics) {
+    return head(report) + "\nNo ground truth: the errors are not known.\n";
+  }
+  return head(report) + '\n' + error_table(report);
+}
+
+std::string format_timing_table(const TimingReport& report) {
+  TextTable table("lrrrrr");
+  table.add({"stage", "calls", "median ms", "p95 ms", "CPU ms/frame", "share %"});
+  table.rule();
+  const auto add = [&](std::vector<std::string> row, double cpu_s) {
+    row.push_back(fmt::format("{:.3f}", 1e3 * cpu_s / static_cast<double>(report.num_frames)));
+    row.push_back(fmt::format("{:.1f}", 100.0 * cpu_s / report.cpu_s));
+    table.add(row);
+  };
+  for (const StageTiming& stage : report.stages) {
+    add({stage.name, fmt::format("{}", stage.calls), fmt::format("{:.3f}", stage.median_ms),
+         fmt::format("{:.3f}", stage.p95_ms)},
+        stage.cpu_s);
+  }
+  add({"start, other, OpenCV's threads", "", "", ""}, report.rest_cpu_s);
+  table.rule();
+  add({"processor time", "", "", ""}, report.cpu_s);
+  return table.str() + fmt::format("\n{:.1f} frames/s, {} frames, {} threads, {:.0f} MiB at most\n",
+                                   report.fps, report.num_frames, report.num_threads,
+                                   report.peak_memory_mib);
 }
 
 }  // namespace stemvo

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "evaluation/pose_file.hpp"
+#include "evaluation/trajectory.hpp"
 #include "report/frame_image.hpp"
 #include "report/metrics_json.hpp"
 

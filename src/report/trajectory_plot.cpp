@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "report/trajectory_plot.hpp"
 
 #include <algorithm>
 #include <cmath>

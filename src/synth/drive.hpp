@@ -9,6 +9,7 @@
 
 #include "evaluation/trajectory.hpp"
 #include "synth/scene.hpp"
+#include "synth/synth.hpp"
 
 namespace stemvo::synth {
 
@@ -126,17 +127,23 @@ struct Walk {
   Courtyard courtyard;
 };
 
-struct WalkOptions {
-  double rate_hz = 30.0;
-  int visit = 0;
-  bool blank_walls = false;
-  std::optional<double> turn_rate_rad_s =
-      std::nullopt;  ///< at a turn's middle; nullopt: 1.2 to 1.5
-};
-
 /// A walk with a camera in the hand, some 1.5 m above the floor, at 0.5 m/s in the mean: the sway
 /// of steps, slow wander of the view, turns, glances aside and pauses. Each visit takes another way
 /// through the courtyard of `seed`.
-[[nodiscard]] Walk make_walk(int num_frames, std::uint64_t seed, const WalkOptions& options = {});
+[[nodiscard]] Walk make_walk(int num_frames, std::uint64_t seed, const RenderOptions& options = {});
+
+/// The same street driven again: up to 0.9 m further left or 0.6 m further right, with other sway,
+/// at 0.9 to 1 times the speed, from between the first two frames on.
+void drive_again(std::uint64_t seed, int visit, Drive& drive);
+
+/// Light of a place at one time.
+struct Daylight {
+  Vec3 to_sun;
+  double ambient_factor = 1.0;
+  float gain = 1.0F;  ///< of the camera
+};
+
+/// Visit 0 is the first one.
+[[nodiscard]] Daylight daylight(std::uint64_t seed, int visit);
 
 }  // namespace stemvo::synth

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "synth/painter.hpp"
-
 #include <algorithm>
 #include <optional>
 #include <span>
+
+#include "synth/renderer.hpp"
 
 namespace stemvo::synth {
 namespace {

@@ -40,12 +40,15 @@ struct Shutter {
 };
 
 /// Steps below 1 px within an exposure and below 0.1 px from rows to rows.
-Shutter plan_shutter(const RenderOptions& options, const Camera& camera, double px_per_s) {
+Shutter plan_shutter(const RenderOptions& options,
+                     double rate_hz,
+                     const Camera& camera,
+                     double px_per_s) {
   constexpr int kMaxMoments = 31;
   constexpr int kMaxRows = 16;
   Shutter shutter{};
-  shutter.row_frames = options.readout_s / camera.height_px * options.rate_hz;
-  shutter.exposure_frames = options.exposure_s * options.rate_hz;
+  shutter.row_frames = options.readout_s / camera.height_px * rate_hz;
+  shutter.exposure_frames = options.exposure_s * rate_hz;
   const double blur_px = std::min(px_per_s * options.exposure_s, 1.0 * kMaxMoments);
   shutter.moments = std::min(1 + 2 * static_cast<int>(std::ceil(0.5 * blur_px)), kMaxMoments);
   const double row_px = px_per_s * options.readout_s / camera.height_px;
@@ -67,7 +70,7 @@ Renderer::Renderer(CameraPath path,
       textures_(seed),
       daylight_(daylight(seed, options.visit)) {
   if (const auto* drive = std::get_if<Drive>(&path_); drive != nullptr && options.traffic) {
-    traffic_ = std::make_unique<Traffic>(*drive, hash_of(seed, 'T', options.visit));
+    traffic_ = plan_traffic(*drive, hash_of(seed, 'T', options.visit));
   }
   gains_.assign(world_from_camera().size(), daylight_.gain);
   if (options.follows_light) {
@@ -78,6 +81,10 @@ Renderer::Renderer(CameraPath path,
 const Trajectory& Renderer::world_from_camera() const {
   return std::visit([](const auto& path) -> const Trajectory& { return path.world_from_camera; },
                     path_);
+}
+
+double Renderer::rate_hz() const {
+  return std::holds_alternative<Walk>(path_) ? options_.walk_rate_hz : kDriveRate_hz;
 }
 
 RenderedFrame Renderer::render(std::size_t index) const {
@@ -97,8 +104,7 @@ Scene Renderer::still_scene(std::size_t index) const {
     add_courtyard(walk->courtyard, scene);
   } else {
     const auto& drive = std::get<Drive>(path_);
-    add_street(drive.road, drive.arcs_m[index], hash_of(seed_, 0), scene,
-               traffic_ ? traffic_->crossings() : std::vector<int>());
+    add_street(drive.road, drive.arcs_m[index], hash_of(seed_, 0), scene, traffic_.crossings);
   }
   return scene;
 }
@@ -108,8 +114,8 @@ RenderedFrame Renderer::light_of(std::size_t index) const {
   if (options_.exposure_s > 0.0 || options_.readout_s > 0.0) {
     return light_over_time(index, scene);
   }
-  if (traffic_) {
-    traffic_->add_at(static_cast<double>(index), scene);
+  if (traffic_.add_at) {
+    traffic_.add_at(static_cast<double>(index), scene);
   }
   const Rigid3& pose = world_from_camera()[index];
   return paint(pointers_to(scene), seen_from(pose.translation, pose), camera_, textures_,
@@ -124,8 +130,8 @@ RenderedFrame Renderer::light_over_time(std::size_t index, const Scene& still) c
       pose_at(poses, frame_index - 0.5).inverse() * pose_at(poses, frame_index + 0.5);
   const double near_m = std::holds_alternative<Walk>(path_) ? 1.5 : 4.0;
   const double px_per_s =
-      camera_.fx_px * options_.rate_hz * (step.angle_rad() + step.translation.norm() / near_m);
-  const Shutter shutter = plan_shutter(options_, camera_, px_per_s);
+      camera_.fx_px * rate_hz() * (step.angle_rad() + step.translation.norm() / near_m);
+  const Shutter shutter = plan_shutter(options_, rate_hz(), camera_, px_per_s);
   RenderedFrame frame{cv::Mat(camera_.height_px, camera_.width_px, CV_32FC3, cv::Scalar::all(0)),
                       cv::Mat(camera_.height_px, camera_.width_px, CV_32FC1),
                       cv::Mat(camera_.height_px, camera_.width_px, CV_8UC1)};
@@ -137,8 +143,8 @@ RenderedFrame Renderer::light_over_time(std::size_t index, const Scene& still) c
       const double at = frame_index + shutter.delay(middle_row, camera_.height_px, moment);
       Scene moving = still.without_faces();
       std::vector<const Face*> faces = still_faces;
-      if (traffic_) {
-        traffic_->add_at(at, moving);
+      if (traffic_.add_at) {
+        traffic_.add_at(at, moving);
         std::ranges::copy(pointers_to(moving), std::back_inserter(faces));
       }
       const RenderedFrame part = paint(faces, seen_from(origin, pose_at(poses, at)), camera_,
@@ -177,7 +183,7 @@ void Renderer::follow_light() {
       means[index] = (mean[0] + mean[1] + mean[2]) / 3.0;
     }
   });
-  const double share = 1.0 - std::exp(-1.0 / (kSettle_s * options_.rate_hz));
+  const double share = 1.0 - std::exp(-1.0 / (kSettle_s * rate_hz()));
   double gain = kTarget / means.front();
   for (std::size_t i = 0; i < gains_.size(); ++i) {
     gains_[i] = static_cast<float>(gain);

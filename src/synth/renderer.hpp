@@ -2,30 +2,37 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <span>
 #include <variant>
 #include <vector>
 
+#include <opencv2/core.hpp>
+
+#include "stemvo/camera.hpp"
+#include "stemvo/rigid3.hpp"
 #include "synth/drive.hpp"
-#include "synth/painter.hpp"
+#include "synth/materials.hpp"
+#include "synth/scene.hpp"
 #include "synth/traffic.hpp"
-#include "synth/visit.hpp"
 
 namespace stemvo::synth {
 
-using CameraPath = std::variant<Drive, Walk>;
-
-struct RenderOptions {
-  int visit = 0;         ///< chooses light and noise; 0 is the first one
-  bool traffic = false;  ///< on the street of a drive
-  double rate_hz = kDriveRate_hz;
-  /// The pose of a frame is that of its middle row in the middle of its exposure.
-  double exposure_s = 0.0;  ///< 0: no motion blur
-  double readout_s = 0.0;   ///< from the first row to the last; 0: all rows at once
-  bool small_chip =
-      false;  ///< a small camera's chip (sensor.hpp) in place of an almost perfect one
-  bool follows_light = false;  ///< exposure settles in half a second; else it is constant
+struct RenderedFrame {
+  cv::Mat rgb;      ///< CV_8UC3
+  cv::Mat depth_m;  ///< CV_32FC1: z in the camera's frame, infinite in the sky
+  cv::Mat moving;   ///< CV_8UC1: 255 where a thing moves on its own, or its shadow
 };
+
+/// A perfect camera sees this at one moment on the rows [rows.start, rows.end): frames of so many
+/// rows; `rgb` is CV_32FC3, where 1 is white. `scene_from_camera`: in the axes of the faces'
+/// points.
+[[nodiscard]] RenderedFrame paint(std::span<const Face* const> faces,
+                                  const Rigid3& scene_from_camera,
+                                  const Camera& camera,
+                                  const Textures& textures,
+                                  cv::Range rows,
+                                  double fill = 1.0);
+using CameraPath = std::variant<Drive, Walk>;
 
 /// Draws frames of a drive or of a walk. One frame needs nothing of the others, so any number of
 /// threads may call render() at once.
@@ -38,6 +45,7 @@ class Renderer {
            const RenderOptions& options = {});
 
   [[nodiscard]] const Trajectory& world_from_camera() const;
+  [[nodiscard]] double rate_hz() const;
   [[nodiscard]] RenderedFrame render(std::size_t index) const;
 
  private:
@@ -55,8 +63,8 @@ class Renderer {
   std::uint64_t noise_seed_;
   Textures textures_;
   Daylight daylight_;
-  std::unique_ptr<Traffic> traffic_;  ///< none: nothing moves
-  std::vector<float> gains_;          ///< per frame
+  Traffic traffic_;           ///< empty: nothing moves
+  std::vector<float> gains_;  ///< per frame
 };
 
 }  // namespace stemvo::synth

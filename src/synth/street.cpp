@@ -2,10 +2,9 @@
 #include <algorithm>
 #include <optional>
 
-#include "synth/buildings.hpp"
 #include "synth/drive.hpp"
 #include "synth/materials.hpp"
-#include "synth/vehicles.hpp"
+#include "synth/objects.hpp"
 
 namespace stemvo::synth {
 namespace {

@@ -36,7 +36,7 @@ Camera camera_of(const SyntheticDriveOptions& options) {
 
 Expected<synth::Drive> plan_drive(const SyntheticDriveOptions& options) {
   if (!options.trajectory) {
-    return synth::make_own_drive(options.num_frames, options.seed, options.traffic);
+    return synth::make_own_drive(options.num_frames, options.seed, options.render.traffic);
   }
   STEMVO_TRY_GET(auto poses, read_kitti_trajectory(*options.trajectory));
   poses.resize(std::min(poses.size(), static_cast<std::size_t>(options.num_frames)));
@@ -45,17 +45,11 @@ Expected<synth::Drive> plan_drive(const SyntheticDriveOptions& options) {
 
 Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
   if (options.walk) {
-    std::optional<double> turn_rate_rad_s;
-    if (options.turn_rate_deg_s) {
-      turn_rate_rad_s = synth::radians(*options.turn_rate_deg_s);
-    }
-    return synth::make_walk(
-        options.num_frames, options.seed,
-        {options.walk_rate_hz, options.visit, options.blank_walls, turn_rate_rad_s});
+    return synth::make_walk(options.num_frames, options.seed, options.render);
   }
   STEMVO_TRY_GET(auto drive, plan_drive(options));
-  if (options.visit > 0) {
-    synth::drive_again(options.seed, options.visit, drive);
+  if (options.render.visit > 0) {
+    synth::drive_again(options.seed, options.render.visit, drive);
   }
   return drive;
 }
@@ -85,7 +79,7 @@ Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
   if (options.write_depth) {
     fs::create_directory(drive.sequence / "depth", code);
   }
-  if (options.traffic) {
+  if (options.render.traffic) {
     fs::create_directory(drive.sequence / "moving", code);
   }
   STEMVO_TRY(pipeline::create_out_folder(drive.poses.parent_path()));
@@ -116,7 +110,7 @@ Status render_frames(const synth::Renderer& renderer,
       // Noise does not compress: the fastest level costs a few per cent of size.
       result = write_text_file(sequence / fmt::format("image_2/{:06}.png", i),
                                io::encode_png(frame.rgb, true));
-      if (result && options.traffic) {
+      if (result && options.render.traffic) {
         result = write_text_file(sequence / fmt::format("moving/{:06}.png", i),
                                  io::encode_png(frame.moving));
       }
@@ -168,10 +162,7 @@ Status render_synthetic_drive(const fs::path& out_dir,
                           out_dir / "poses" / (options.name + ".txt")};
   STEMVO_TRY_GET(const auto lock, open_folder(drive, options));
   const Camera camera = camera_of(options);
-  const double rate_hz = options.walk ? options.walk_rate_hz : synth::kDriveRate_hz;
-  const synth::Renderer renderer(std::move(path), camera, options.seed,
-                                 {options.visit, options.traffic, rate_hz, options.exposure_s,
-                                  options.readout_s, options.small_chip, options.follows_light});
+  const synth::Renderer renderer(std::move(path), camera, options.seed, options.render);
   const Trajectory& poses = renderer.world_from_camera();
   const int total = static_cast<int>(poses.size());
   const int batch = std::max(1, cv::getNumThreads());  // frames at once: bounds the memory
@@ -186,7 +177,7 @@ Status render_synthetic_drive(const fs::path& out_dir,
     go_on = !progress || progress(static_cast<std::size_t>(done), poses.size());
   }
   return write_texts(drive, camera, std::span(poses).first(static_cast<std::size_t>(done)),
-                     rate_hz);
+                     renderer.rate_hz());
 }
 
 }  // namespace stemvo

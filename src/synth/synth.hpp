@@ -12,15 +12,10 @@
 
 namespace stemvo {
 
-/// A rendered street or courtyard in KITTI layout with exact poses.
-struct SyntheticDriveOptions {
-  /// KITTI poses to drive along; else own curve.
-  std::optional<std::filesystem::path> trajectory = std::nullopt;
-  /// A hand-held camera through a courtyard, in place of a car along a street.
-  bool walk = false;
-  int num_frames = 100;  ///< with a trajectory: at most its length
+namespace synth {
+/// How frames of a drive or walk are rendered.
+struct RenderOptions {
   double walk_rate_hz = 30.0;
-  std::uint64_t seed = 1;
   /// The world of `seed` (and `trajectory`, `num_frames`) at another time: on another path, in
   /// other light. 0: the first visit.
   int visit = 0;
@@ -32,6 +27,18 @@ struct SyntheticDriveOptions {
   double readout_s = 0.0;      ///< rolling shutter, first to last row: the pose is the middle row's
   bool small_chip = false;     ///< point spread, fill, noise, response of a small camera's chip
   bool follows_light = false;  ///< exposure settles in half a second; else it is constant
+};
+}  // namespace synth
+
+/// A rendered street or courtyard in KITTI layout with exact poses.
+struct SyntheticDriveOptions {
+  /// KITTI poses to drive along; else own curve.
+  std::optional<std::filesystem::path> trajectory = std::nullopt;
+  /// A hand-held camera through a courtyard, in place of a car along a street.
+  bool walk = false;
+  int num_frames = 100;  ///< with a trajectory: at most its length
+  std::uint64_t seed = 1;
+  synth::RenderOptions render = {};
   std::optional<int> width_px = std::nullopt;   ///< nullopt: 1241, with a walk 640
   std::optional<int> height_px = std::nullopt;  ///< nullopt: 376, with a walk 480
   std::string name = "00";                      ///< names the sequence's folder and the pose file

@@ -77,13 +77,13 @@ using Crossing = Eigen::Vector2i;
 class WalkPlan {
  public:
   WalkPlan(const Courtyard& courtyard,
-           const WalkOptions& options,
+           const RenderOptions& options,
            double duration_s,
            double cruise_m_s)
       : yard_(courtyard),
         draw_(options.visit == 0 ? Draw(courtyard.seed, 'v')
                                  : Draw(courtyard.seed, 'v', options.visit)),
-        turn_rate_rad_s_(options.turn_rate_rad_s),
+        turn_rate_deg_s_(options.turn_rate_deg_s),
         cruise_m_s_(cruise_m_s) {
     // The start lies in the middle of a way from one side to the other.
     const std::array<Crossing, 4> directions = {{{0, 1}, {1, 0}, {0, -1}, {-1, 0}}};
@@ -197,14 +197,14 @@ class WalkPlan {
     phase.heading_to_rad = heading_to(to_);
     constexpr double kMeanOfPeak = 8.0 / 15.0;  // as turns are eased
     double rate_rad_s = radians(draw_.in(36.0, 46.0));
-    rate_rad_s = turn_rate_rad_s_ ? kMeanOfPeak * *turn_rate_rad_s_ : rate_rad_s;
+    rate_rad_s = turn_rate_deg_s_ ? kMeanOfPeak * radians(*turn_rate_deg_s_) : rate_rad_s;
     phase.duration_s = std::abs(phase.heading_to_rad - heading_rad_) / rate_rad_s;
     add(phase);
   }
 
   const Courtyard& yard_;
   Draw draw_;
-  std::optional<double> turn_rate_rad_s_;
+  std::optional<double> turn_rate_deg_s_;
   double cruise_m_s_;
   double now_s_ = 0.0;
   double last_pause_s_ = 0.0;
@@ -217,7 +217,7 @@ class WalkPlan {
 
 /// Turns and pauses included, the camera then moves at 0.5 m/s in the mean.
 double cruising_speed_m_s(const Courtyard& courtyard,
-                          const WalkOptions& options,
+                          const RenderOptions& options,
                           double duration_s) {
   constexpr double kMean_m_s = 0.5;
   double low_m_s = 0.2 * kMean_m_s;
@@ -313,16 +313,16 @@ struct Hand {
 
 }  // namespace
 
-Walk make_walk(int num_frames, std::uint64_t seed, const WalkOptions& options) {
+Walk make_walk(int num_frames, std::uint64_t seed, const RenderOptions& options) {
   Walk walk;
   walk.courtyard = lay_courtyard(seed);
   walk.courtyard.has_blank_walls = options.blank_walls;
-  const double duration_s = num_frames / options.rate_hz;
+  const double duration_s = num_frames / options.walk_rate_hz;
   const WalkPlan plan(walk.courtyard, options, duration_s,
                       cruising_speed_m_s(walk.courtyard, options, duration_s));
   const Hand hand{options.visit == 0 ? seed : hash_of(seed, 'V', options.visit)};
   for (int i = 0; i < num_frames; ++i) {
-    const double time_s = i / options.rate_hz;
+    const double time_s = i / options.walk_rate_hz;
     walk.world_from_camera.push_back(hand.world_from_camera(stance_at(plan, time_s), time_s));
   }
   return walk;

@@ -158,6 +158,12 @@ std::string one_line(std::string_view text) {
   return text.size() > kMaxBytes ? line + ".." : line;
 }
 
+void add_line(std::vector<std::string>& lines, std::string line) {
+  if (!line.empty()) {
+    lines.push_back(std::move(line));
+  }
+}
+
 std::string at_line(const fs::path& file, std::size_t line) {
   return fmt::format("{}:{}", file.string(), line);
 }

@@ -49,6 +49,8 @@ inline constexpr double kNanosecond_s = 1e-9;
 
 /// Shortens a text from elsewhere to what a message may hold: one line of at most 300 bytes.
 [[nodiscard]] std::string one_line(std::string_view text);
+/// Adds a line, unless it is empty.
+void add_line(std::vector<std::string>& lines, std::string line);
 /// "file:line", line counted from 1, for messages.
 [[nodiscard]] std::string at_line(const std::filesystem::path& file, std::size_t line);
 /// The error with file and line in front; `index` counts lines from 0.

@@ -2,7 +2,7 @@
 // Poses in the formats of KITTI, TUM and EuRoC.
 #include <algorithm>
 
-#include "evaluation/pose_file.hpp"
+#include "evaluation/trajectory.hpp"
 #include "fuzz_input.hpp"
 
 namespace {

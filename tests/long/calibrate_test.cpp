@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "dataset/kitti_text.hpp"
+#include "dataset/frame_files.hpp"
 #include "support/program_test.hpp"
 #include "support/shared_data.hpp"
 #include "support/state_runs.hpp"

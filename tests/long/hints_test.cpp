@@ -21,9 +21,12 @@ class Hints : public ::testing::Test {
  protected:
   void SetUp() override {
     // It turns by 83 degrees a second at most: 22 between frames.
-    const Status rendered = render_synthetic_drive(
-        folder_ / "walk",
-        {.walk = true, .num_frames = 34, .walk_rate_hz = 3.75, .width_px = 480, .height_px = 360});
+    const Status rendered =
+        render_synthetic_drive(folder_ / "walk", {.walk = true,
+                                                  .num_frames = 34,
+                                                  .render = {.walk_rate_hz = 3.75},
+                                                  .width_px = 480,
+                                                  .height_px = 360});
     ASSERT_TRUE(rendered) << rendered.error().message;
   }
 

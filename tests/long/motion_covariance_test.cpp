@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "dataset/kitti_text.hpp"
+#include "dataset/frame_files.hpp"
 #include "evaluation/trajectory.hpp"
 #include "stemvo/odometry.hpp"
 #include "support/drives.hpp"

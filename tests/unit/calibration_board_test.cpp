@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The camera by pictures of printed boards, rendered with a camera that is known.
-#include "calibration/board_coverage.hpp"
-#include "calibration/calibrate_board.hpp"
+#include "calibration/board.hpp"
+#include "calibration/calibrate.hpp"
 #include "dataset/camera_file.hpp"
 #include "support/rendered_board.hpp"
 #include "support/run_program.hpp"

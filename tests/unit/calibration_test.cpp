@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The command in this process, under the sanitizers too.
 #include "calibration/calibrate.hpp"
-#include "calibration/lens.hpp"
 #include "dataset/camera_file.hpp"
 #include "dataset/frame_source.hpp"
 #include "geometry/distortion.hpp"
@@ -19,7 +18,7 @@ class CalibrateSequence : public ::testing::Test {
   CalibrateSequence() {
     EXPECT_TRUE(render_synthetic_drive(folder_.path(), {.walk = true,
                                                         .num_frames = kNumFrames,
-                                                        .walk_rate_hz = 10.0,
+                                                        .render = {.walk_rate_hz = 10.0},
                                                         .width_px = 320,
                                                         .height_px = 240}));
     request_.sequence_dir = folder_ / "sequences/00";

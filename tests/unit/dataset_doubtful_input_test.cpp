@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Inputs that are sound by themselves and would give a wrong path: refused, read right, or said.
 #include "dataset/frame_files.hpp"
-#include "evaluation/pose_file.hpp"
+#include "evaluation/trajectory.hpp"
 #include "support/test.hpp"
 #include "text/text_file.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "evaluation/metrics.hpp"
-#include "evaluation/pose_file.hpp"
+#include "evaluation/trajectory.hpp"
 #include "support/shared_data.hpp"
 #include "support/test.hpp"
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "evaluation/pose_file.hpp"
 #include "evaluation/trajectory.hpp"
 #include "support/test.hpp"
 

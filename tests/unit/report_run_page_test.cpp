@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <nlohmann/json.hpp>
 
-#include "evaluation/pose_file.hpp"
+#include "evaluation/trajectory.hpp"
 #include "report/run_page.hpp"
 #include "support/report_content.hpp"
 #include "support/test.hpp"

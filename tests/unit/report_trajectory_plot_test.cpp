@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "report/trajectory_plot.hpp"
+#include "report/frame_image.hpp"
 #include "support/test.hpp"
 
 namespace stemvo {

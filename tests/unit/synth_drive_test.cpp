@@ -68,10 +68,10 @@ TEST_F(SyntheticDriveTest, SameBytesForAnyNumberOfThreadsAndOtherOnesForAnotherS
   SyntheticDriveOptions walk = small(3);
   walk.walk = true;
   SyntheticDriveOptions drive = small(3);  // with all that a drive may have
-  drive.traffic = true;
-  drive.exposure_s = 0.004;
-  drive.readout_s = 0.01;
-  drive.follows_light = true;
+  drive.render.traffic = true;
+  drive.render.exposure_s = 0.004;
+  drive.render.readout_s = 0.01;
+  drive.render.follows_light = true;
   for (SyntheticDriveOptions options : {walk, drive}) {
     cv::setNumThreads(1);
     ASSERT_TRUE(render_synthetic_drive(root_ / "one", options));

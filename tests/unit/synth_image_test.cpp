@@ -66,7 +66,7 @@ TEST(SyntheticImage, DepthAndPosesPredictTheNextFrame) {
 
 /// Walking, looking aside, turning on the spot: surfaces are 0.6 to 6 m away.
 TEST(SyntheticImage, DepthAndPosesPredictTheNextFrameOfAWalk) {
-  const Renderer renderer(make_walk(600, 1, {.rate_hz = 30.0}), hand_camera(), 1);
+  const Renderer renderer(make_walk(600, 1, {.walk_rate_hz = 30.0}), hand_camera(), 1);
   Offsets offsets;
   for (std::size_t i = 10; i < 600; i += 97) {
     offsets.add(renderer, i, hand_camera());

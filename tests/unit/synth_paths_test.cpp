@@ -141,7 +141,7 @@ double way_m(const Trajectory& poses, std::size_t begin, std::size_t end) {
 
 TEST(Walk, IsSmooth) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    const Trajectory poses = make_walk(kFrames, seed, {.rate_hz = kRate_hz}).world_from_camera;
+    const Trajectory poses = make_walk(kFrames, seed, {.walk_rate_hz = kRate_hz}).world_from_camera;
     for (std::size_t i = 1; i + 1 < poses.size(); ++i) {
       const Eigen::Vector3d before = (poses[i].translation - poses[i - 1].translation) * kRate_hz;
       const Eigen::Vector3d after = (poses[i + 1].translation - poses[i].translation) * kRate_hz;
@@ -156,15 +156,15 @@ TEST(Walk, IsSmooth) {
 
 TEST(Walk, KeepsItsMeanSpeed) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    const Trajectory poses = make_walk(kFrames, seed, {.rate_hz = kRate_hz}).world_from_camera;
+    const Trajectory poses = make_walk(kFrames, seed, {.walk_rate_hz = kRate_hz}).world_from_camera;
     EXPECT_NEAR(way_m(poses, 0, kFrames - 1) * kRate_hz / (kFrames - 1), 0.5, 0.025) << seed;
   }
 }
 
 /// Frames of another rate are other moments of the same walk, where both last equally long.
 TEST(Walk, IsTheSameAtAnyRate) {
-  const Trajectory fast = make_walk(600, 4, {.rate_hz = 30.0}).world_from_camera;
-  const Trajectory slow = make_walk(200, 4, {.rate_hz = 10.0}).world_from_camera;
+  const Trajectory fast = make_walk(600, 4, {.walk_rate_hz = 30.0}).world_from_camera;
+  const Trajectory slow = make_walk(200, 4, {.walk_rate_hz = 10.0}).world_from_camera;
   for (std::size_t i = 0; i < slow.size(); ++i) {
     const Rigid3 between = slow[i].inverse() * fast[3 * i];
     ASSERT_LT(between.translation.norm() + between.angle_rad(), 1e-9);
@@ -173,7 +173,8 @@ TEST(Walk, IsTheSameAtAnyRate) {
 
 TEST(Walk, TurnsAsFastAsAsked) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    const Walk walk = make_walk(kFrames, seed, {.rate_hz = kRate_hz, .turn_rate_rad_s = 3.49});
+    const Walk walk =
+        make_walk(kFrames, seed, {.walk_rate_hz = kRate_hz, .turn_rate_deg_s = 200.0});
     double most_deg_s = 0.0;
     for (std::size_t i = 1; i < walk.world_from_camera.size(); ++i) {
       const Rigid3 step = walk.world_from_camera[i - 1].inverse() * walk.world_from_camera[i];

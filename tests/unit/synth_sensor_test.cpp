@@ -113,7 +113,7 @@ Camera small_camera() { return {292.5, 292.5, 160.0, 120.0, 320, 240}; }
 
 /// A camera that turns to the right in the middle of the courtyard's first walkway.
 Walk turning() {
-  Walk walk = make_walk(2, 3, {.rate_hz = kRate_hz});
+  Walk walk = make_walk(2, 3, {.walk_rate_hz = kRate_hz});
   const Eigen::Vector3d at(walk.courtyard.x_m[0], -1.5, walk.courtyard.z_m[1]);
   walk.world_from_camera.clear();
   for (int i = 0; i < 5; ++i) {
@@ -153,8 +153,8 @@ TEST(Shutter, BlursByExposureTimesFlow) {
   constexpr double kExposure_s = 0.03;
   const double expected_px = 292.5 * kTurn_rad_s * kExposure_s;
   ASSERT_GT(expected_px, 8.0);
-  const cv::Mat sharp = render({.rate_hz = kRate_hz});
-  const cv::Mat blurred = render({.rate_hz = kRate_hz, .exposure_s = kExposure_s});
+  const cv::Mat sharp = render({.walk_rate_hz = kRate_hz});
+  const cv::Mat blurred = render({.walk_rate_hz = kRate_hz, .exposure_s = kExposure_s});
   const cv::Rect middle(110, 80, 100, 80);
   double best_px = 0.0;
   double least = 1e12;
@@ -171,8 +171,8 @@ TEST(Shutter, BlursByExposureTimesFlow) {
 
 TEST(Shutter, ShearsByReadoutTimesFlow) {
   constexpr double kReadout_s = 0.03;
-  const cv::Mat at_once = render({.rate_hz = kRate_hz});
-  const cv::Mat by_rows = render({.rate_hz = kRate_hz, .readout_s = kReadout_s});
+  const cv::Mat at_once = render({.walk_rate_hz = kRate_hz});
+  const cv::Mat by_rows = render({.walk_rate_hz = kRate_hz, .readout_s = kReadout_s});
   for (const int row : {20, 70, 120, 170, 220}) {
     // A turn to the right moves everything to the left: later rows are further left.
     const double delay_s = kReadout_s * ((row + 0.5) / 240.0 - 0.5);
@@ -197,9 +197,9 @@ TEST(Shutter, ShearsByReadoutTimesFlow) {
 TEST(Shutter, WithoutMotionChangesNothing) {
   Walk walk = turning();
   std::ranges::fill(walk.world_from_camera, walk.world_from_camera.front());
-  const Renderer plain(walk, small_camera(), 3, {.rate_hz = kRate_hz});
+  const Renderer plain(walk, small_camera(), 3, {.walk_rate_hz = kRate_hz});
   const Renderer slow(walk, small_camera(), 3,
-                      {.rate_hz = kRate_hz, .exposure_s = 0.02, .readout_s = 0.02});
+                      {.walk_rate_hz = kRate_hz, .exposure_s = 0.02, .readout_s = 0.02});
   EXPECT_EQ(cv::norm(plain.render(2).rgb, slow.render(2).rgb, cv::NORM_INF), 0.0);
   EXPECT_EQ(cv::norm(plain.render(2).depth_m < 1e6, slow.render(2).depth_m < 1e6, cv::NORM_INF),
             0.0);
@@ -229,7 +229,8 @@ TEST(AutoExposure, FollowsTheLightWithDelay) {
   const Trajectory views = walk.world_from_camera;
   walk.world_from_camera.assign(60, views[dark]);
   std::fill(walk.world_from_camera.begin() + 5, walk.world_from_camera.end(), views[bright]);
-  const Renderer follows(walk, small_camera(), 3, {.rate_hz = kRate_hz, .follows_light = true});
+  const Renderer follows(walk, small_camera(), 3,
+                         {.walk_rate_hz = kRate_hz, .follows_light = true});
   const double before = mean_of(follows, 4);
   EXPECT_GT(mean_of(follows, 5), 1.1 * before) << "no delay";
   EXPECT_GT(mean_of(follows, 5), mean_of(follows, 15)) << "settles";

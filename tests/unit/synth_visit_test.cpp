@@ -3,7 +3,6 @@
 #include "support/test.hpp"
 #include "synth/drive.hpp"
 #include "synth/renderer.hpp"
-#include "synth/visit.hpp"
 
 namespace stemvo::synth {
 namespace {
@@ -115,7 +114,7 @@ TEST(Visit, SameStreetOnAnotherPath) {
 }
 
 TEST(Visit, SameCourtyardOnAnotherWay) {
-  const Walk first = make_walk(600, 4, {.rate_hz = 30.0});
+  const Walk first = make_walk(600, 4, {.walk_rate_hz = 30.0});
   const Walk again = make_walk(600, 4, {.visit = 1});
   EXPECT_EQ(first.courtyard.x_m, again.courtyard.x_m);
   EXPECT_EQ(first.courtyard.wall_m, again.courtyard.wall_m);
