@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdlib>
 #include <map>
+#include <regex>
 #include <set>
 #include <string>
 #include <system_error>
@@ -176,9 +178,24 @@ Error one_time(const fs::path& given, const fs::path& file, const fs::path& othe
       (file.parent_path() / pattern).string()));
 }
 
+/// Whole minutes: the numbers are seconds, which go on from one beginning to the next ("12-30-59",
+/// "12-31-00") in their usual step. `before`: one of the beginnings.
+bool are_seconds(const std::string& before, const std::set<std::string>& numbers) {
+  static const std::regex kMinute("(.*[^0-9])?([01][0-9]|2[0-3])[^0-9]?[0-5][0-9][^0-9]");
+  constexpr double kMinute_s = 60.0;
+  std::vector<double> seconds;
+  for (const std::string& number : numbers) {
+    seconds.push_back(std::strtod(number.c_str(), nullptr));
+  }
+  const auto [first, last] = std::ranges::minmax(seconds);
+  const double step_s = (last - first) / static_cast<double>(seconds.size() - 1);
+  return last < kMinute_s && kMinute_s + first - last < 1.5 * step_s &&
+         std::regex_match(before, kMinute);
+}
+
 /// Error: two images of one number, which are two cameras or one picture twice; or names with the
 /// same last numbers behind several beginnings (cam1_, cam2_), which are as many cameras. Where
-/// there are more beginnings than numbers, they are hours or seconds.
+/// there are more beginnings than numbers, they are hours or seconds; so are whole minutes.
 Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) {
   struct Group {
     std::set<std::string> numbers;
@@ -202,7 +219,8 @@ Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) 
     cameras[group.numbers].push_back(group.first);
   }
   for (const auto& [numbers, firsts] : cameras) {
-    if (firsts.size() > 1 && numbers.size() >= firsts.size() && numbers.size() > 1) {
+    if (firsts.size() > 1 && numbers.size() >= firsts.size() && numbers.size() > 1 &&
+        !are_seconds(parts_of(firsts[0]).before, numbers)) {
       return one_time(given, firsts[0], firsts[1]);
     }
   }

@@ -278,6 +278,11 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   frames.camera_height_m = camera.camera_height_m;
   frames.warnings = camera.warnings;
   add_line(frames.warnings, warn_of_turn(*stream, owner));
+  if (request.rate_hz && stream->num_counted() == 0) {
+    frames.warnings.push_back(
+        fmt::format("--rate {}: {} says when each frame was taken, which goes before it",
+                    *request.rate_hz, owner));
+  }
   if (stream->decoder().gray_bits > 8) {
     frames.warnings.push_back(fmt::format(
         "{}: of {} bits per gray level the upper 8 are taken; images of 16 bits are read whole",

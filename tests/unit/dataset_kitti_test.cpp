@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "dataset/frame_source.hpp"
 #include "dataset/frame_files.hpp"
+#include "dataset/frame_source.hpp"
 #include "support/matchers.hpp"
 #include "support/test.hpp"
 #include "text/text_file.hpp"

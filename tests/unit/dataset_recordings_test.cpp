@@ -176,6 +176,9 @@ TEST_F(Recordings, AVideoIsReadFrameByFrame) {
   }
   const auto behind = source->read(5).value();
   EXPECT_TRUE(behind.empty());
+  EXPECT_THAT(source->warnings, IsEmpty());
+  video.rate_hz = 50.0;
+  EXPECT_THAT(open_source(video)->warnings, ElementsAre(HasSubstr("--rate 50: ")));
 }
 
 TEST_F(Recordings, AVideoIsTurnedAsPlayersDo) {
