@@ -112,9 +112,6 @@ QuadraticModel<6> linearize_pose(const Rigid3& camera_from_world,
 }
 
 constexpr std::size_t kMinPoints = 4;
-constexpr double kTolerance = 1e-7;
-/// Error of a point behind the camera.
-constexpr double kBehind_px = 1e3;
 
 using Matrix7d = Eigen::Matrix<double, 7, 7>;
 using Vector7d = Eigen::Matrix<double, 7, 1>;
@@ -127,7 +124,7 @@ void add_observation(const Eigen::Vector3d& x,
                      CauchyLoss& loss,
                      QuadraticModel<7>& equations) {
   if (!(x.z() > internal::kMinDepth)) {
-    loss.add(kBehind_px * kBehind_px);
+    loss.add(kBehindErrorPx * kBehindErrorPx);
     return;
   }
   const internal::ReprojectionTerm at = internal::reprojection_term(x, uv, camera);
@@ -244,7 +241,7 @@ RefinedSimilarity refine_similarity(const Similarity3& a_from_b,
   const auto linearize = [&](const Similarity3& state) {
     return linearize_similarity(state, seen, options.loss_scale_px);
   };
-  minimize<7>(refined.a_from_b, linearize, move_similarity, options.max_iterations, kTolerance);
+  minimize<7>(refined.a_from_b, linearize, move_similarity, options.max_iterations, kPoseTolerance);
   refined.covariance = linearize(refined.a_from_b).hessian.ldlt().solve(Matrix7d::Identity());
   return refined;
 }

@@ -253,8 +253,7 @@ std::optional<Similarity3> MapKeeper::add_loop(const Loop& loop) {
   std::erase_if(map_.motions, [&, younger = younger](const MapEdge& edge) {
     return edge.is_guess() && component_of(edge.from) < younger && component_of(edge.to) == younger;
   });
-  Similarity3 moved =
-      map_from_keyframe(loop.from) * loop.from_to * map_from_keyframe(loop.to).inverse();
+  Similarity3 moved = map_.pose(loop.from) * loop.from_to * map_.pose(loop.to).inverse();
   if (component_of(loop.from) == younger) {
     moved = moved.inverse();
   }

@@ -82,9 +82,6 @@ class MapKeeper {
   /// The keeper ends.
   [[nodiscard]] KeptMap take_map() { return std::move(map_); }
   [[nodiscard]] KeptKeyframe& keyframe(int node) { return map_.keyframes[slot(node)]; }
-  [[nodiscard]] const Similarity3& map_from_keyframe(int node) const {
-    return map_.map_from_keyframe[slot(node)];
-  }
   /// The node of a keyframe of the window; -1: it is none yet.
   [[nodiscard]] int node_of(int frame) const {
     const auto node = nodes_.find(frame);

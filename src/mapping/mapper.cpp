@@ -114,7 +114,7 @@ void Mapper::begin_lookup(const WindowView& view) {
   if (!keeper_.may_soon_be_joined() && !recognizer_.asks(work.keyframe)) {
     return;
   }
-  const double roll = image_roll_rad(keeper_.map_from_keyframe(work.node).rotation);
+  const double roll = image_roll_rad(keeper_.map().pose(work.node).rotation);
   looked_up_ = begin([this, roll, work = std::move(work), image = newest_.image]() mutable {
     const StageTimer timer(Stage::kPlaces);
     KeptKeyframe& keyframe = work.keyframe;
@@ -154,7 +154,7 @@ Recognition Mapper::take_in(const WindowView& view, const LookedUp& found) {
     keyframes_until_next_ = 0;
   }
   const Similarity3 world_from_old =
-      keeper_.map_from_world().inverse() * keeper_.map_from_keyframe(loop.from);
+      keeper_.map_from_world().inverse() * keeper_.map().pose(loop.from);
   for (const auto& [of_old, of_new] : loop.corners) {
     const KeptCorner& old = keeper_.keyframe(loop.from).corners[static_cast<std::size_t>(of_old)];
     const KeptCorner& corner = keeper_.keyframe(loop.to).corners[static_cast<std::size_t>(of_new)];
@@ -226,7 +226,7 @@ void Mapper::keep_last_view(const WindowView& view) {
   if (last.frame == newest_.frame && node >= 0) {
     KeptKeyframe& kept = keeper_.keyframe(node);
     kept.corners = corners_of(view, last);
-    const double roll = image_roll_rad(keeper_.map_from_keyframe(node).rotation);
+    const double roll = image_roll_rad(keeper_.map().pose(node).rotation);
     add_place(node, describe(image->channel, kept.corners, roll));
   }
 }
@@ -254,7 +254,7 @@ std::optional<Relocation> Mapper::locate(const WindowView& view,
   if (!found.has_value()) {
     return std::nullopt;
   }
-  const Similarity3& map_from_old = keeper_.map_from_keyframe(found->keyframe);
+  const Similarity3& map_from_old = keeper_.map().pose(found->keyframe);
   if (!keeper_.has_own(keeper_.component_of(found->keyframe))) {
     const Similarity3 map_from_camera = map_from_old * Similarity3(found->keyframe_from_camera);
     keeper_.correct(map_from_camera * Similarity3(predicted).inverse());

@@ -142,25 +142,4 @@ class Estimator {
   return scale.source == ScaleSource::kNone ? 1.0 : scale.step_m;
 }
 
-/// A motion that goes on evenly.
-class Velocity {
- public:
-  Velocity() = default;
-  /// `motion`, prev_from_cur, took so long.
-  Velocity(const Rigid3& motion, double interval_s)
-      : rad_per_s_(so3_log(motion.rotation) / interval_s),
-        units_per_s_(motion.translation / interval_s) {}
-
-  /// prev_from_cur after so long. `turned`: its rotation where that is known from elsewhere.
-  [[nodiscard]] Rigid3 motion(double interval_s,
-                              const std::optional<Eigen::Quaterniond>& turned = {}) const {
-    return {turned.value_or(so3_exp(interval_s * rad_per_s_)), interval_s * units_per_s_};
-  }
-  [[nodiscard]] double speed() const { return units_per_s_.norm(); }
-
- private:
-  Eigen::Vector3d rad_per_s_ = Eigen::Vector3d::Zero();  ///< a rotation vector
-  Eigen::Vector3d units_per_s_ = Eigen::Vector3d::Zero();
-};
-
 }  // namespace stemvo

@@ -2,10 +2,12 @@
 #include "stemvo/odometry.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <deque>
 #include <mutex>
 #include <span>
+#include <string_view>
 #include <system_error>
 #include <thread>
 
@@ -61,6 +63,24 @@ std::vector<TrackedPoint> tracked_points_of(const ChannelOdometry& frames) {
 }
 
 }  // namespace
+
+std::string_view to_string(FrameState state) {
+  constexpr std::array<std::string_view, 9> kNames{"first",      "initializing", "tracking",
+                                                   "stationary", "low_parallax", "rotating",
+                                                   "gated",      "lost",         "no_image"};
+  static_assert(kNames.size() == static_cast<std::size_t>(FrameState::kNoImage) + 1);
+  return kNames.at(static_cast<std::size_t>(state));
+}
+
+bool is_measured(FrameState state) {
+  return state != FrameState::kGated && state != FrameState::kLost && state != FrameState::kNoImage;
+}
+
+std::string_view to_string(ScaleState state) {
+  constexpr std::array<std::string_view, 4> kNames{"disabled", "none", "held", "measured"};
+  static_assert(kNames.size() == static_cast<std::size_t>(ScaleState::kMeasured) + 1);
+  return kNames.at(static_cast<std::size_t>(state));
+}
 
 struct OdometryHandle::Impl {
   Impl(PhasedOdometry given,

@@ -40,7 +40,9 @@ class MotionChain {
   /// A frame without an image, or without a motion: the last motion goes on. With an image the next
   /// motion starts here, without one it starts at the last image.
   void extrapolate(bool has_image) {
-    world_from_camera_ = world_from_camera_ * velocity_.motion(interval_s_, turned_);
+    world_from_camera_ =
+        world_from_camera_ *
+        Rigid3(turned_.value_or(so3_exp(interval_s_ * rad_per_s_)), interval_s_ * units_per_s_);
     if (has_image) {
       world_from_image_ = world_from_camera_;
       image_time_s_ = time_s_;
@@ -70,7 +72,8 @@ class MotionChain {
     const Eigen::Quaterniond rotation = options_.composition == Composition::kPaper
                                             ? prev_from_cur.rotation * world_from_image_.rotation
                                             : world_from_image_.rotation * prev_from_cur.rotation;
-    velocity_ = Velocity({prev_from_cur.rotation, step_in_prev}, since_image_s());
+    rad_per_s_ = so3_log(prev_from_cur.rotation) / since_image_s();
+    units_per_s_ = step_in_prev / since_image_s();
     world_from_image_ = {rotation, position};
     world_from_camera_ = world_from_image_;
     image_time_s_ = time_s_;
@@ -85,7 +88,9 @@ class MotionChain {
   std::optional<Eigen::Quaterniond> turned_;
   Rigid3 world_from_image_;   ///< pose of the last image, where the matches start
   Rigid3 world_from_camera_;  ///< pose of the last frame
-  Velocity velocity_;         ///< of the last motion; for extrapolation
+  // The last motion, for extrapolation.
+  Eigen::Vector3d rad_per_s_ = Eigen::Vector3d::Zero();  ///< a rotation vector
+  Eigen::Vector3d units_per_s_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d last_direction_ = Eigen::Vector3d::UnitZ();  ///< of travel, in the camera
   bool is_initializing_ = true;
 };

@@ -12,11 +12,9 @@
 namespace stemvo {
 namespace {
 
-bool is_before(const Observation& a, const Observation& b) { return a.track_id < b.track_id; }
-
 void sort_by_id(Observations& points) {
-  if (!std::is_sorted(points.begin(), points.end(), is_before)) {
-    std::sort(points.begin(), points.end(), is_before);
+  if (!std::ranges::is_sorted(points, {}, &Observation::track_id)) {
+    std::ranges::sort(points, {}, &Observation::track_id);
   }
 }
 
@@ -79,8 +77,7 @@ const Observation* find_point(const Observations& points, int track_id) {
   if (points.empty() || track_id < points.front().track_id || track_id > points.back().track_id) {
     return nullptr;  // most are: tracks are young or old
   }
-  const auto found =
-      std::lower_bound(points.begin(), points.end(), Observation{track_id, {}}, is_before);
+  const auto found = std::ranges::lower_bound(points, track_id, {}, &Observation::track_id);
   return found != points.end() && found->track_id == track_id ? &*found : nullptr;
 }
 
@@ -88,7 +85,7 @@ PointPairs common_points(const Observations& prev, const Observations& cur) {
   PointPairs pairs;
   auto other = prev.begin();
   for (const Observation& point : cur) {
-    while (other != prev.end() && is_before(*other, point)) {
+    while (other != prev.end() && other->track_id < point.track_id) {
       ++other;
     }
     if (other != prev.end() && other->track_id == point.track_id) {
