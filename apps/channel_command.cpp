@@ -7,7 +7,7 @@
 #include "commands.hpp"
 #include "console.hpp"
 #include "options.hpp"
-#include "pipeline/channel_images.hpp"
+#include "pipeline/run.hpp"
 #include "try.hpp"
 
 namespace stemvo::apps {

@@ -19,7 +19,6 @@
 #include "report/metrics_json.hpp"
 
 namespace stemvo::apps {
-
 namespace {
 
 bool is_json = false;

@@ -80,14 +80,8 @@ void add_config_options(CLI::App& command, ConfigArguments& arguments) {
 Expected<Config> read_config(const ConfigArguments& arguments, const Config& base) {
   Config config = base;
   if (!arguments.file.empty()) {
-    const Expected<Config> loaded =
-        find_config(arguments.file).and_then([&](const std::filesystem::path& file) {
-          return load_config(file, base);
-        });
-    if (!loaded) {
-      return loaded;
-    }
-    config = *loaded;
+    STEMVO_TRY_GET(const auto file, find_config(arguments.file));
+    STEMVO_TRY_GET(config, load_config(file, base));
   }
   std::map<std::string, std::string> given;  // key -> the assignment
   for (const std::string& assignment : arguments.overrides) {

@@ -37,7 +37,6 @@ struct BoardPoints {
 /// upper left (OpenCV) or lower left (Kalibr): what fits. Error: no module or no dictionary.
 [[nodiscard]] Expected<BoardPoints> find_board(const Board& board, const cv::Mat& gray);
 
-/// A picture of the board.
 struct BoardView {
   std::string name;
   BoardPoints points;
@@ -47,14 +46,12 @@ struct BoardView {
   bool is_used = true;                 ///< else its error was too large beside the others'
 };
 
-/// One number of the camera with its standard deviation.
 struct FittedNumber {
   std::string name;
   double value = 0.0;
   double sigma = 0.0;
 };
 
-/// The camera that views of a board tell.
 struct BoardFit {
   Camera camera;
   std::vector<FittedNumber> numbers;  ///< fx, fy, cx, cy, k1, k2, p1, p2, k3

@@ -14,7 +14,6 @@
 #include "report/frame_image.hpp"
 
 namespace stemvo {
-
 namespace {
 
 constexpr std::size_t kMinViews = 3;
@@ -90,7 +89,6 @@ constexpr int kRows = 6;     ///< two to a part
 
 using Cells = std::array<std::array<bool, kColumns>, kRows>;
 
-/// Cells with corners.
 Cells covered_cells(const std::vector<BoardView>& views, const cv::Size& size) {
   Cells cells = {};
   for (const BoardView& view : views) {

@@ -2,11 +2,9 @@
 #include "calibration/calibrate.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include <Eigen/QR>
 #include <fmt/format.h>
@@ -42,7 +40,6 @@ fs::path calibration_file(const CalibrationRequest& request, const FrameSource& 
   return sequence.given_calibration.value_or(request.sequence_dir / "calib.txt");
 }
 
-/// Everything that can be wrong with a request before work starts.
 Status check_request(const CalibrationRequest& request, const FrameSource& sequence) {
   std::vector<fs::path> inputs = pipeline::input_files(request, sequence, request.config);
   inputs.insert(inputs.end(), {calibration_file(request, sequence), request.config.file,
@@ -51,7 +48,6 @@ Status check_request(const CalibrationRequest& request, const FrameSource& seque
   return check_can_write(request.out_file);
 }
 
-/// The map that the odometry leaves of the recording.
 Expected<KeptMap> drive(const CalibrationRequest& request,
                         const FrameSource& sequence,
                         const RunProgress& progress,
@@ -159,7 +155,6 @@ Camera changed(Camera camera, const LensDelta& by) {
   return camera;
 }
 
-/// All over the view.
 std::vector<SeenRay> seen_rays(const Camera& lens,
                                const Camera& view,
                                const IntrinsicsDelta& change) {

@@ -17,13 +17,11 @@
 
 namespace stemvo {
 
-/// Everything `stemvo calibrate` was asked for. The camera is that of `config`.
 struct CalibrationRequest : FrameSourceRequest {
   std::filesystem::path out_file;
   Config config;  ///< of the odometry that drives
 };
 
-/// One number of the calibration.
 struct CalibratedParameter {
   std::string name;
   double given = 0.0;
@@ -58,7 +56,6 @@ struct CalibrationReport {
 [[nodiscard]] Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request,
                                                              const RunProgress& progress = {});
 
-/// Given, refined, standard deviation; what they rest on.
 [[nodiscard]] std::string format_calibration_table(const CalibrationReport& report);
 
 /// The lens whose frames, once `lens` is taken out of them as `view` (geometry/distortion.hpp),
@@ -68,7 +65,6 @@ struct CalibrationReport {
                                   const Camera& view,
                                   const IntrinsicsDelta& change);
 
-/// Everything `stemvo calibrate --board` was asked for.
 struct BoardRequest {
   std::filesystem::path pictures;  ///< a folder, a pattern of images, a video
   std::filesystem::path out_file;  ///< camera.yaml
@@ -76,7 +72,6 @@ struct BoardRequest {
   std::string board_text;  ///< as it was given, for the file
 };
 
-/// The camera, and what it rests on.
 struct BoardReport {
   BoardFit fit;
   std::vector<BoardView> views;      ///< that show the board
@@ -93,7 +88,6 @@ struct BoardReport {
 [[nodiscard]] Expected<BoardReport> calibrate_board(const BoardRequest& request,
                                                     const RunProgress& progress = {});
 
-/// Numbers with their sigmas, views left out, pictures to take next.
 [[nodiscard]] std::string format_board_table(const BoardReport& report);
 
 }  // namespace stemvo

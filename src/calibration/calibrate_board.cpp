@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <cmath>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -51,7 +50,6 @@ Status add_view(const Board& board,
   return {};
 }
 
-/// Beside the camera file.
 fs::path coverage_file(const BoardRequest& request) {
   fs::path file = request.out_file;
   file.replace_extension();
@@ -100,7 +98,7 @@ Expected<cv::Size> look_at_video(const BoardRequest& request,
                                  const RunProgress& progress,
                                  BoardReport& report) {
   STEMVO_TRY(pipeline::check_is_no_input(request.out_file, {request.pictures}));
-  STEMVO_TRY_GET(const auto stream, dataset::VideoStream::open_file(request.pictures, {}));
+  STEMVO_TRY_GET(const auto stream, dataset::VideoStream::open(request.pictures, {}));
   add_line(report.warnings, dataset::warn_of_turn(*stream, request.pictures.string()));
   constexpr std::size_t kMaxLooks = 300;
   constexpr std::size_t kUsualStep = 5;

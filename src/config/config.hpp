@@ -12,7 +12,6 @@
 
 namespace stemvo {
 
-/// Keys `input.*`.
 struct InputOptions {
   std::string camera = "auto";
 };
@@ -43,9 +42,7 @@ struct Config : Options {
                                            const Config& base = {});
 /// `key=value` of --set, e.g. "stem.filter=10".
 [[nodiscard]] Status apply_override(Config& config, const std::string& assignment);
-/// Ranges and choices of every key; written so that NaN fails.
 [[nodiscard]] Status validate(const Config& config);
-/// The value of key scale.source.
 [[nodiscard]] std::string_view scale_source(const Config& config);
 /// YAML with every key, exact (numbers round-trip).
 [[nodiscard]] std::string dump_config(const Config& config);

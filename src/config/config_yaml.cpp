@@ -5,9 +5,7 @@
 #include <charconv>
 #include <map>
 #include <sstream>
-#include <utility>
 
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <yaml-cpp/eventhandler.h>
 
@@ -36,7 +34,6 @@ constexpr std::pair<std::string_view, std::string_view> kRenamed[] = {
     {"stem.upsample", "stem.tracking_resolution"},
 };
 
-/// "; its name is ... now", or nothing.
 std::string new_name(const std::string& name) {
   for (const auto& [before, now] : kRenamed) {
     if (before == name) {
@@ -62,7 +59,6 @@ double likeness(std::string_view a, std::string_view b) {
   return 2.0 * num_shared / static_cast<double>(std::max(a.size() + b.size(), std::size_t{3}) - 2);
 }
 
-/// "; did you mean stem.filter?", or nothing.
 std::string like_name(const std::string& name, const std::vector<Key>& keys) {
   constexpr double kMinLikeness = 0.6;
   double best = kMinLikeness;

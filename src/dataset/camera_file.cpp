@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <string>
-#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -58,7 +56,6 @@ Format message(const char* k, const char* d, const char* p) {
   return {"width", "height", k, d, "T_BS", p, "[fx, 0, cx, 0, fy, cy, 0, 0, 1]", true, true};
 }
 
-/// `map` is the document, a map.
 Format format_of(const YAML::Node& map) {
   return map["cam0"] && map["cam0"].IsMap() ? kKalibr
          : map["camera_matrix"]             ? kMatrices
@@ -105,7 +102,6 @@ class Reader {
   }
 
  private:
-  /// Parses the file, and finds the values of the keys that are read.
   Status collect() {
     STEMVO_TRY_GET(std::string text, read_text_file(file_, kMaxSettings_MB));
     if (text.starts_with("%YAML:")) {
@@ -155,7 +151,6 @@ class Reader {
   }
   [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }
   void refuse(const Error& error) { status_ = status_ ? Status(error) : status_; }
-  /// "<file>:<line>: <key>: <problem>"
   void refuse(const std::string& key, const std::string& problem) {
     refuse(at(values_.at(key), key + ": " + problem));
   }
@@ -179,7 +174,6 @@ class Reader {
     }
     return is_inside ? std::optional(numbers->front()) : std::nullopt;
   }
-  /// A number of pixels; 0: there is none.
   int side(const std::string& key, double given) {
     const bool is_side = given == std::floor(given) && given >= 1.0 && given <= kMaxImageSide_px;
     if (has(key) && !is_side) {

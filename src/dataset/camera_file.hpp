@@ -12,7 +12,6 @@
 
 namespace stemvo::dataset {
 
-/// Contents of a camera file.
 struct CameraFile {
   Camera camera;
   std::optional<double> rate_hz;
@@ -25,16 +24,11 @@ struct CameraFile {
   }
 };
 
-/// The format is told by its keys. Ours is YAML with the keys image_width and image_height or
-/// `resolution: [w, h]`, camera_model (pinhole, also where it is absent), intrinsics [fx, fy, cx,
-/// cy], distortion_model (none, radial-tangential, equidistant, or others' names of them),
-/// distortion_coefficients, and where known rate_hz and camera_height. EuRoC's sensor.yaml is one,
-/// with T_BS (sensor_type and comment are not read). Others, whose further keys are not read:
-/// Kalibr's camchain.yaml (cam0), OpenCV's FileStorage (camera_matrix, distortion_coefficients,
-/// fisheye_model), ROS' camera_info (the same and distortion_model; or its message as `topic echo`
-/// prints it: width, height, distortion_model, k and d, in ROS 1 K and D). cameras.txt is COLMAP's
-/// Errors, naming file and line: unreadable, not YAML, a key missing, unknown or
-/// twice, a value that cannot be, ROS' roi or binning, skew, a camera that check_camera refuses.
+/// The format is told by its keys: ours (`stemvo run --help`), with T_BS EuRoC's sensor.yaml;
+/// Kalibr's camchain.yaml (cam0), OpenCV's FileStorage, ROS' camera_info or its message as `topic
+/// echo` prints it, whose further keys are not read. cameras.txt is COLMAP's. Errors, naming file
+/// and line: unreadable, not YAML, a key missing, unknown or twice, a value that cannot be, ROS'
+/// roi or binning, skew, a camera that check_camera refuses.
 [[nodiscard]] Expected<CameraFile> read_camera_file(const std::filesystem::path& file);
 /// COLMAP's cameras.txt of one camera.
 [[nodiscard]] Expected<CameraFile> read_colmap_camera(const std::filesystem::path& file);

@@ -84,7 +84,7 @@ Expected<CameraFile> read_colmap_camera(const std::filesystem::path& file) {
     if (!camera) {
       return fail_at(file, i, camera.error());
     }
-    STEMVO_TRY(check_camera(*camera, at_line(file, i + 1)));
+    STEMVO_TRY(check_camera(*camera, fmt::format("{}:{}", file.string(), i + 1)));
     result.camera = *camera;
     ++num_cameras;
   }

@@ -3,16 +3,11 @@
 
 #include <algorithm>
 #include <numeric>
-#include <optional>
-#include <span>
 #include <system_error>
 
 #include <fmt/format.h>
 
-#include "dataset/camera_file.hpp"
-#include "io/image_file.hpp"
 #include "odometry/check_frame.hpp"
-#include "text/text_file.hpp"
 #include "try.hpp"
 
 namespace stemvo::dataset {
@@ -23,7 +18,6 @@ namespace {
 
 constexpr int kBlack = 128;
 
-/// `X,Y,WIDTH,HEIGHT`; nullopt: no four numbers.
 std::optional<cv::Rect2d> parse_rectangle(std::string part) {
   std::ranges::replace(part, ',', ' ');
   const auto numbers = parse_numbers(part, 4);
@@ -57,7 +51,6 @@ Status add_part(const std::string& part, cv::Mat& mask) {
   return {};
 }
 
-/// The times of all images, where something says them.
 Expected<TimedRows<double>> find_times(const Listing& listing, const FrameSourceRequest& request) {
   const std::size_t num_images = listing.files.size();
   const auto& file = request.times ? request.times : listing.times_file;
@@ -76,7 +69,6 @@ Expected<TimedRows<double>> find_times(const Listing& listing, const FrameSource
   return read;
 }
 
-/// Error: images that are not of the camera file's size.
 Expected<SharedKind> check_images(FrameSource& frames,
                                   const fs::path& folder,
                                   const fs::path& camera_file,
@@ -90,6 +82,22 @@ Expected<SharedKind> check_images(FrameSource& frames,
                     kind.size.width, kind.size.height));
   }
   return kind;
+}
+
+/// Without times: the camera file's, else the rate asked for, else 30, with a note.
+double rate_of(const CameraFile& camera, const FrameSourceRequest& request, FrameSource& frames) {
+  constexpr double kUsualRate_hz = 30.0;
+  if (!camera.rate_hz && !request.rate_hz) {
+    add_line(frames.notes,
+             fmt::format("times: {} frames per second are taken for granted; --rate HZ, "
+                         "--times FILE or rate_hz in the camera file says another",
+                         kUsualRate_hz));
+  } else if (camera.rate_hz && request.rate_hz && *camera.rate_hz != *request.rate_hz) {
+    frames.warnings.push_back(
+        fmt::format("--rate {}: the camera file's rate_hz goes before it: {} frames per second",
+                    *request.rate_hz, *camera.rate_hz));
+  }
+  return camera.rate_hz.value_or(request.rate_hz.value_or(kUsualRate_hz));
 }
 
 }  // namespace
@@ -173,21 +181,6 @@ Status add_ground_truth(FrameSource& frames,
   STEMVO_TRY_GET(frames.ground_truth,
                  match_frames(truth, frames.range.begin, frames.timestamps_s, tolerance_s));
   return {};
-}
-
-double rate_of(const CameraFile& camera, const FrameSourceRequest& request, FrameSource& frames) {
-  constexpr double kUsualRate_hz = 30.0;
-  if (!camera.rate_hz && !request.rate_hz) {
-    add_line(frames.notes,
-             fmt::format("times: {} frames per second are taken for granted; --rate HZ, "
-                         "--times FILE or rate_hz in the camera file says another",
-                         kUsualRate_hz));
-  } else if (camera.rate_hz && request.rate_hz && *camera.rate_hz != *request.rate_hz) {
-    frames.warnings.push_back(
-        fmt::format("--rate {}: the camera file's rate_hz goes before it: {} frames per second",
-                    *request.rate_hz, *camera.rate_hz));
-  }
-  return camera.rate_hz.value_or(request.rate_hz.value_or(kUsualRate_hz));
 }
 
 Expected<FrameView> view_of(const Camera& camera, const fs::path& camera_file) {

@@ -29,8 +29,7 @@ namespace stemvo::dataset {
 [[nodiscard]] bool is_folder(const std::filesystem::path& path);
 /// Without a trailing separator, so that its last part is the folder's name.
 [[nodiscard]] std::filesystem::path absolute_folder(const std::filesystem::path& folder);
-/// The last part of a folder's name that tells it from others: not `images`, `rgb`, `data`, `mav0`,
-/// `cam0` or `image_2`, as the folders of every recording are called.
+/// The last part of a folder's name that not every recording has, as `images` or `cam0`.
 [[nodiscard]] std::string recording_name(const std::filesystem::path& folder);
 /// All entries of a folder, in no order. Error: it cannot be listed.
 [[nodiscard]] Expected<std::vector<std::filesystem::path>> list_folder(
@@ -47,21 +46,14 @@ namespace stemvo::dataset {
 [[nodiscard]] FrameSource list_frames(const FrameRange& range,
                                       const std::vector<std::filesystem::path>& files,
                                       const std::vector<double>& times_s);
-/// Adds the poses of a file: by time where it has times, else one per frame; then it has at least
-/// the poses up to the range's end, `is_exact`: as many as there are files in all (`num_files`).
-/// `camera_file`: as read_truth says. Errors: those of read_truth; another number of poses; none
-/// of these times.
+/// Adds the poses of a file: by time where it has times, else one per frame, as many as there are
+/// files in all if `is_exact`. Errors: those of read_truth; another number of poses; other times.
 [[nodiscard]] Status add_ground_truth(FrameSource& frames,
                                       const std::filesystem::path& poses,
                                       const std::optional<std::filesystem::path>& camera_file,
                                       double tolerance_s,
                                       std::size_t num_files,
                                       bool is_exact);
-
-/// Frames per second without times: the camera file's, else those asked for, else 30, with a note.
-[[nodiscard]] double rate_of(const CameraFile& camera,
-                             const FrameSourceRequest& request,
-                             FrameSource& frames);
 
 /// Images that were listed; what the request names goes before what lies beside them.
 [[nodiscard]] Expected<FrameSource> open_listing(const Listing& listing,
@@ -98,16 +90,14 @@ struct SharedKind {
   bool is_color = false;
   io::Levels levels;
 };
-/// The size and colours that most of the first five readable images have: one odd frame must not
-/// throw the rest away; levels that differ from all of 16 bits are a warning. Error: none can be
-/// read.
+/// Properties of most of the first five readable images: one odd frame must not throw the rest
+/// away. Levels that differ from all of 16 bits are a warning. Error: none can be read.
 [[nodiscard]] Expected<SharedKind> vote_on_images(FrameSource& frames);
 
-/// Parts of the frames, in their pixels as they come, where no points are wanted: rectangles
-/// `X,Y,WIDTH,HEIGHT`, which may reach over the rim, and image files of the frames' size, black
-/// (below 128) where none. Returns CV_8UC1, 0 there and 255 elsewhere; nothing asked for: an empty
-/// image. Errors: neither of both; a rectangle that is empty or outside; a file of another size;
-/// nothing left.
+/// Where points are wanted: CV_8UC1, 0 in the parts and 255 elsewhere; no parts: an empty image.
+/// They are rectangles `X,Y,WIDTH,HEIGHT`, which may reach over the rim, and image files of the
+/// frames' size as they come, black (below 128) where none. Errors: neither of both; a rectangle
+/// that is empty or outside; a file of another size; nothing left.
 [[nodiscard]] Expected<cv::Mat> make_mask(const std::vector<std::string>& parts, cv::Size size);
 
 /// The camera's poses, also of EuRoC's file, whose poses are the body's: T_BS of the camera file
@@ -131,19 +121,16 @@ struct SharedKind {
                                                  double tolerance_s);
 
 /// Intrinsics of camera `index` (0..3) from its row `PN:` (odometry and object benchmarks) or
-/// `P_rect_0N:` (raw data): 12 numbers, row-major 3x4. The size of the image is left at zero.
-/// Errors: no such row; not 12 finite numbers; a focal length that is not positive; skew.
+/// `P_rect_0N:` (raw data); the size stays zero. Errors: no such row; not 12 finite numbers; skew.
 [[nodiscard]] Expected<Camera> read_kitti_camera(const std::filesystem::path& file, int index);
 
 /// The text of a calib.txt with other intrinsics in every projection row whose intrinsics are
-/// `given`: rectified cameras share them. The row's offset to the first camera in metres,
-/// K^-1 p4, stays. Every other line is kept as it is. Error: the file cannot be read.
+/// `given`; the row's offset to the first camera in metres, K^-1 p4, stays. Error: unreadable.
 [[nodiscard]] Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
                                                          const Camera& given,
                                                          const Camera& refined);
 
-/// One time per line, as read_timed_rows reads them, for at least `num_expected` images. Errors:
-/// not one finite number in a line, not increasing, fewer lines.
+/// One time per line, for at least `num_expected` images. Errors: read_timed_rows'; fewer lines.
 [[nodiscard]] Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
                                                            std::size_t num_expected);
 

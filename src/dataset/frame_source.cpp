@@ -28,7 +28,6 @@ bool is_bag(const fs::path& path) {
                        : is_file(path / "metadata.yaml");
 }
 
-/// The error for an input that is none of those that are read.
 Error refuse(const fs::path& path) {
   std::string problem =
       "expected KITTI's layout (image_2 or image_0, calib.txt, times.txt), EuRoC's (mav0/cam0), "
@@ -53,7 +52,6 @@ Error refuse(const fs::path& path) {
   return fail(fmt::format("{}: {}", path.string(), problem));
 }
 
-/// A listing of images, if it is one that is known.
 std::optional<Expected<dataset::Listing>> find_listing(const FrameSourceRequest& request) {
   const fs::path& path = request.sequence_dir;
   auto found = dataset::find_listing(path);
@@ -70,7 +68,6 @@ std::optional<Expected<dataset::Listing>> find_listing(const FrameSourceRequest&
   return images;
 }
 
-/// Files that belong to other kinds of recordings.
 Status check_unused(const FrameSourceRequest& request, bool is_listing, bool is_stream) {
   if (request.calibration && (is_listing || is_stream)) {
     return fail(fmt::format(

@@ -40,14 +40,13 @@ struct StreamInfo {
   double counted_hz = 30.0;                   ///< of frames without a time
 };
 
-/// True poses of some frames.
 struct GroundTruth {
   Trajectory poses;                 ///< the first is the identity
   std::vector<std::size_t> frames;  ///< whose they are; increasing
 };
 
 /// Frames of one camera, in order, and all that is known of them before one is read. Files, times
-/// and poses are those of the range, one per frame; a stream has none of them but a video's file.
+/// and poses are those of the range; a stream has none of them but a video's file.
 struct FrameSource {
   std::string kind;    ///< what it was recognised as, e.g. "KITTI sequence"
   std::string name;    ///< of the folder, e.g. "03"
@@ -72,11 +71,10 @@ struct FrameSource {
   /// size.
   std::function<Expected<cv::Mat>(std::size_t)> read;
   std::optional<StreamInfo> stream = std::nullopt;
-  /// Finds the true poses by the times of frames that were read; only a stream with a pose file
-  /// has it.
+  /// Of a stream with a pose file: finds the true poses by the times of frames that were read.
   std::function<Expected<GroundTruth>(const std::vector<double>& times_s)> match = nullptr;
 
-  /// The number of frames; of a stream the most there may be.
+  /// Of a stream: the most there may be.
   [[nodiscard]] std::size_t size() const { return stream ? stream->max_frames : files.size(); }
   [[nodiscard]] bool has_ground_truth() const { return ground_truth || match; }
   /// The time of a frame; a stream knows it after the frame was read.
@@ -85,14 +83,12 @@ struct FrameSource {
   }
   /// The warnings; of a stream that was read also that times were counted.
   [[nodiscard]] std::vector<std::string> warnings_so_far() const;
-  /// Notes and warnings, for a program that says all in one place.
   [[nodiscard]] std::vector<std::string> remarks() const;
   /// True poses of the first `num_frames`, where they have one; nullopt: there is no ground truth.
   /// Error, of a stream only: no times match.
   [[nodiscard]] Expected<std::optional<GroundTruth>> ground_truth_of(std::size_t num_frames) const;
 };
 
-/// Keys `input.*` of the configuration, and the program's --frames, --gt and --calib.
 struct SequenceOptions {
   std::string camera = "auto";  ///< `auto` (image_2 if there, else image_0), `image_0` .. `image_3`
   std::optional<FrameRangeRequest> frames = std::nullopt;
@@ -105,7 +101,6 @@ struct SequenceOptions {
   std::optional<std::filesystem::path> calibration = std::nullopt;
 };
 
-/// The recording that was asked for, and the files given beside it.
 struct FrameSourceRequest : SequenceOptions {
   /// A folder, a pattern such as `drive/left_*.png` (* and ? in the last part), a video file, or
   /// `camera:N`.
@@ -116,20 +111,18 @@ struct FrameSourceRequest : SequenceOptions {
   std::optional<double> rate_hz = std::nullopt;
 };
 
-/// Finds out what it is: `camera:N`; a file: a video; a folder in EuRoC's layout, TUM RGB-D's or
-/// ours (camera.yaml beside the images; listing.hpp); with `camera_file` any folder of PNG and JPEG
-/// images, or a pattern, in the order of their names, numbers by value; else KITTI's layout. All
-/// but KITTI's are undistorted when read, colour if the images are. Errors: those of
-/// open_kitti; none of these; no camera file; a camera file that is wrong; no images;
-/// images of another size; times or poses that do not fit; a range outside; a rate beside times.
+/// Finds out what it is: `camera:N`; a file: a video; a folder that find_listing knows; with
+/// `camera_file` any folder of PNG and JPEG images, or a pattern; else KITTI's layout. All but
+/// KITTI's are undistorted when read, colour if the images are. Errors: those of open_kitti; none
+/// of these; no camera file, or a wrong one; no images, or of another size; times or poses that do
+/// not fit; a range outside; a rate beside times.
 [[nodiscard]] Expected<FrameSource> open_source(const FrameSourceRequest& request);
 
 /// A folder with some of what only KITTI's layout has: open_kitti says what is missing.
 [[nodiscard]] bool looks_like_kitti(const std::filesystem::path& folder);
 /// A KITTI odometry folder: image_N/%06d.png, calib.txt (row PN), times.txt. Frames are gray of the
-/// gray cameras. Errors: folder, images, calib row, times missing or malformed; gap in the
-/// numbering; range outside; fewer poses or times than frames; a --gt file that cannot be read; a
-/// --calib file whose principal point is outside the image (one of another image size).
+/// gray cameras. Errors: folder, images, calib row, times or --gt file missing or malformed; gap in
+/// the numbering; range outside; fewer poses or times than frames; a calibration of another size.
 [[nodiscard]] Expected<FrameSource> open_kitti(const std::filesystem::path& directory,
                                                const SequenceOptions& options = {});
 

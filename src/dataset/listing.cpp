@@ -7,11 +7,9 @@
 #include <map>
 #include <regex>
 #include <set>
-#include <string>
 #include <system_error>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 #include <fnmatch.h>
@@ -35,7 +33,6 @@ std::optional<fs::path> if_exists(const fs::path& file) {
   return is_there(file) ? std::optional(file) : std::nullopt;
 }
 
-/// The listing with the images that a list names, and their times.
 Expected<Listing> read_list(const fs::path& list, double unit_s, Listing listing) {
   STEMVO_TRY_GET(auto found, read_timed_rows(list, {2}, "a time and an image's name", {}, unit_s));
   listing.note = std::move(found.note);
@@ -63,23 +60,21 @@ std::optional<fs::path> find_euroc_camera(const fs::path& folder) {
 
 Expected<Listing> list_euroc(const fs::path& camera) {
   const fs::path mav = camera.parent_path();
-  Listing listing;
-  listing.kind = "EuRoC recording";
-  listing.folder = camera / "data";
-  listing.name = recording_name(mav);
-  listing.camera_file = camera / "sensor.yaml";
-  listing.ground_truth = if_exists(mav / "state_groundtruth_estimate0/data.csv");
-  return read_list(camera / "data.csv", kNanosecond_s, std::move(listing));
+  return read_list(camera / "data.csv", kNanosecond_s,
+                   {.kind = "EuRoC recording",
+                    .folder = camera / "data",
+                    .name = recording_name(mav),
+                    .camera_file = camera / "sensor.yaml",
+                    .ground_truth = if_exists(mav / "state_groundtruth_estimate0/data.csv")});
 }
 
 Expected<Listing> list_tum(const fs::path& folder) {
-  Listing listing;
-  listing.kind = "TUM RGB-D recording";
-  listing.folder = folder;
-  listing.name = recording_name(folder);
-  listing.camera_file = if_exists(folder / "camera.yaml");
-  listing.ground_truth = if_exists(folder / "groundtruth.txt");
-  return read_list(folder / "rgb.txt", 1.0, std::move(listing));
+  return read_list(folder / "rgb.txt", 1.0,
+                   {.kind = "TUM RGB-D recording",
+                    .folder = folder,
+                    .name = recording_name(folder),
+                    .camera_file = if_exists(folder / "camera.yaml"),
+                    .ground_truth = if_exists(folder / "groundtruth.txt")});
 }
 
 Expected<Listing> list_own(const fs::path& folder) {

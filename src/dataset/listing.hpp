@@ -16,38 +16,33 @@ struct Listing {
   std::string kind;              ///< "EuRoC recording", "TUM RGB-D recording", "images"
   std::filesystem::path folder;  ///< of the images
   std::string name;
-  std::vector<std::filesystem::path> files;  ///< at least one
-  std::vector<double> times_s = {};          ///< one per file, or none
-  std::string note = {};                     ///< how the times were found; may be empty
-  std::string warning = {};                  ///< images that may be two of a time
+  std::vector<std::filesystem::path> files = {};  ///< at least one
+  std::vector<double> times_s = {};               ///< one per file, or none
+  std::string note = {};                          ///< how the times were found; may be empty
+  std::string warning = {};                       ///< images that may be two of a time
   std::optional<std::filesystem::path> camera_file = std::nullopt;
   std::optional<std::filesystem::path> times_file = std::nullopt;
   std::optional<std::filesystem::path> ground_truth = std::nullopt;
 };
 
 /// The listing of a folder in one of these layouts; nullopt: another one, or none.
-/// EuRoC: `mav0`, its parent, or one camera of it (cam0, cam1): data.csv names the images of
-/// data/ and their times in ns, sensor.yaml is the camera, state_groundtruth_estimate0/data.csv the
-/// ground truth where it exists.
-/// TUM RGB-D: rgb.txt names the images and their times in s, groundtruth.txt the ground truth. It
-/// has no camera file of its own; camera.yaml in the folder is taken.
+/// EuRoC: `mav0`, its parent, or one camera of it (cam0, cam1), whose data.csv has times in ns.
+/// TUM RGB-D: rgb.txt, times in s, groundtruth.txt; camera.yaml in the folder is taken.
 /// Ours: camera.yaml in a folder of images, or beside its folder `images`; times.txt and poses.txt
 /// where they exist.
 [[nodiscard]] std::optional<Expected<Listing>> find_listing(const std::filesystem::path& folder);
 
-/// The .png, .jpg and .jpeg files of a folder, or those that a pattern names, with nothing beside
-/// them. Hidden files, whose names start with a dot, are none of them. Errors: no such folder;
-/// wildcards elsewhere than in the last part; none found; in a folder, two of one number.
+/// The .png, .jpg and .jpeg files of a folder, or those that a pattern names, but hidden ones.
+/// Errors: no such folder; wildcards elsewhere than in the last part; none found; in a folder, two
+/// of one number.
 [[nodiscard]] Expected<Listing> list_images(const std::filesystem::path& folder_or_pattern);
 
-/// A file whose name says that it is an image.
 [[nodiscard]] bool is_image_file(const std::filesystem::path& file);
 /// Whether this is no path that exists and has *, ? or [.
 [[nodiscard]] bool is_pattern(const std::filesystem::path& path);
 /// The shell's patterns: `*` stands for any characters, `?` for one, `[0-4]` for one of these.
 [[nodiscard]] bool matches_pattern(const std::string& name, const std::string& pattern);
-/// Whether `a` comes before `b`: character by character, but whole numbers by their value, so that
-/// frame2 comes before frame10. Of equals (frame2, frame02) the order of characters decides.
+/// Character by character, but whole numbers by their value: frame2 comes before frame10.
 [[nodiscard]] bool comes_before(std::string_view a, std::string_view b);
 
 }  // namespace stemvo::dataset

@@ -8,7 +8,6 @@
 
 #include "odometry/frame_clock.hpp"
 #include "stemvo/rigid3.hpp"
-#include "text/text_file.hpp"
 #include "try.hpp"
 
 namespace stemvo::dataset {
@@ -16,7 +15,6 @@ namespace {
 
 constexpr double kMaxGap_s = 0.1;  ///< between rates that a rotation is integrated from
 
-/// The numbers behind the time.
 Expected<std::vector<double>> numbers_of(const TimedRow& row, const std::filesystem::path& file) {
   auto numbers = parse_numbers(row.rest, split_words(row.rest).size());
   return numbers ? numbers : fail_at(file, row.line, numbers.error());

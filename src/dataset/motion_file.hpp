@@ -14,24 +14,20 @@
 
 namespace stemvo::dataset {
 
-/// A row of a file of speeds.
 struct SpeedRow {
   double time_s = 0.0;
   double metres_per_s = 0.0;
   double sigma = 0.0;
 };
 
-/// A row of a file of turn rates.
 struct GyroRow {
   double time_s = 0.0;
   Eigen::Vector3d rad_per_s = Eigen::Vector3d::Zero();
 };
 
-/// Rows `time, m/s` or `time, m/s, sigma`, between commas or blanks, `#` before comments; times in
-/// seconds rise. A row without a sigma has 2 % of its speed, and at least 0.05 m/s. Errors, naming
-/// file and line: unreadable, other rows, a sigma that is not above 0, no row. `span_s`: first and
-/// last time of the frames, where they are known; it tells the unit of times that are not in
-/// seconds.
+/// Rows `time, m/s` or `time, m/s, sigma`, as read_timed_rows says. A row without a sigma has 2 %
+/// of its speed, and at least 0.05 m/s. Errors: its; a sigma that is not above 0. `span_s`: first
+/// and last time of the frames, where they are known.
 [[nodiscard]] Expected<TimedRows<SpeedRow>> read_speeds(
     const std::filesystem::path& file,
     const std::optional<std::pair<double, double>>& span_s = std::nullopt);

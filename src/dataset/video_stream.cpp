@@ -4,17 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <string_view>
 #include <system_error>
-#include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
 #include "dataset/frame_files.hpp"
+#include "io/loaded_module.hpp"
+#include "text/text_file.hpp"
 #include "try.hpp"
 
 namespace stemvo::dataset {
@@ -101,10 +101,7 @@ std::string stem_of(const std::filesystem::path& path) {
   return way < end ? std::filesystem::path(address.substr(way, end - way)).stem().string() : "";
 }
 
-}  // namespace
-
-Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& file,
-                                                              const cv::Size& size) {
+Expected<std::shared_ptr<VideoStream>> open_file(const fs::path& file, const cv::Size& size) {
   std::error_code code;
   // A relative path with a colon would be taken for an address.
   STEMVO_TRY_GET(auto decoder, open_decoder(fs::absolute(file, code).c_str(), 0, size));
@@ -124,8 +121,8 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& fi
   return std::make_shared<VideoStream>(*std::move(decoder), file.string(), false);
 }
 
-Expected<std::shared_ptr<VideoStream>> VideoStream::open_address(const std::string& address,
-                                                                 const cv::Size& size) {
+Expected<std::shared_ptr<VideoStream>> open_address(const std::string& address,
+                                                    const cv::Size& size) {
   STEMVO_TRY_GET(auto decoder, open_decoder(address.c_str(), 0, size));
   const std::string name = without_secrets(address);
   if (!decoder || decoder->size.empty()) {
@@ -136,7 +133,7 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open_address(const std::stri
   return std::make_shared<VideoStream>(*std::move(decoder), name, is_live);
 }
 
-Expected<std::shared_ptr<VideoStream>> VideoStream::open_camera(int number, const cv::Size& size) {
+Expected<std::shared_ptr<VideoStream>> open_camera(int number, const cv::Size& size) {
   STEMVO_TRY_GET(auto decoder, open_decoder(nullptr, number, size));
   if (!decoder) {
     return fail(fmt::format(
@@ -145,6 +142,18 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open_camera(int number, cons
         number));
   }
   return std::make_shared<VideoStream>(*std::move(decoder), fmt::format("camera:{}", number), true);
+}
+
+constexpr const char* kVideoModule = "libstemvo_video.so";
+
+}  // namespace
+
+Expected<std::shared_ptr<VideoStream>> VideoStream::open(const fs::path& path,
+                                                         const cv::Size& size) {
+  const auto number = camera_number(path);
+  return number             ? open_camera(*number, size)
+         : is_address(path) ? open_address(path.string(), size)
+                            : open_file(path, size);
 }
 
 std::size_t VideoStream::expected_frames() const {
@@ -318,15 +327,45 @@ Expected<FrameSource> open_video(const FrameSourceRequest& request) {
                     camera_number(request.sequence_dir) ? "a live camera" : "taken for a video"));
   }
   STEMVO_TRY_GET(const auto camera, read_camera_file(*request.camera_file));
-  const auto number = camera_number(request.sequence_dir);
   const cv::Size size(camera.camera.width_px, camera.camera.height_px);
-  const auto stream = number ? VideoStream::open_camera(*number, size)
-                      : is_address(request.sequence_dir)
-                          ? VideoStream::open_address(request.sequence_dir.string(), size)
-                          : VideoStream::open_file(request.sequence_dir, size);
+  const auto stream = VideoStream::open(request.sequence_dir, size);
   return stream.and_then([&](const std::shared_ptr<VideoStream>& opened) {
     return open_stream(opened, camera, request);
   });
+}
+
+Expected<std::optional<VideoDecoder>> open_decoder(const char* file,
+                                                   int number,
+                                                   const cv::Size& size) {
+  static const Expected<void*> found =
+      io::load_symbol(kVideoModule, kOpenDecoder, "decodes videos");
+  return found.map([&](void* open) {
+    std::optional<VideoDecoder> decoder(std::in_place);
+    return reinterpret_cast<OpenDecoder*>(open)(file, number, size, *decoder) ? decoder
+                                                                              : std::nullopt;
+  });
+}
+
+Expected<WriteFrame> encode_file(const std::filesystem::path& file,
+                                 double rate_hz,
+                                 const cv::Size& size) {
+  constexpr const char* kEndings[] = {".mp4", ".mkv", ".avi"};
+  if (std::ranges::find(kEndings, file.extension()) == std::end(kEndings)) {
+    return fail(fmt::format("{}: expected a video to write that ends in .mp4, .mkv or .avi",
+                            file.string()));
+  }
+  STEMVO_TRY(check_can_write(file));
+  STEMVO_TRY_GET(void* const found, io::load_symbol(kVideoModule, kOpenWriter, "writes videos"));
+  WriteFrame write;
+  // A relative path with a colon would be taken for an address.
+  std::error_code code;
+  const auto whole = std::filesystem::absolute(file, code);
+  if (!reinterpret_cast<OpenWriter*>(found)(whole.c_str(), rate_hz, size, write)) {
+    return fail(fmt::format(
+        "{}: expected an encoder of H.264, MPEG-4 or MJPEG for {}x{} pixels, FFmpeg found none",
+        file.string(), size.width, size.height));
+  }
+  return write;
 }
 
 }  // namespace stemvo::dataset

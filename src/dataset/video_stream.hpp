@@ -22,18 +22,11 @@ namespace stemvo::dataset {
 /// Frames of a video file or a live camera, decoded one behind the other; none is kept.
 class VideoStream {
  public:
-  /// Decoded by FFmpeg, as open_decoder says. Error: no file, or not a video.
-  [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open_file(
-      const std::filesystem::path& file, const cv::Size& size);
-  /// Live, unless what is there says how many frames it has. Error: nothing that can be decoded.
-  [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open_address(
-      const std::string& address, const cv::Size& size);
-  /// Camera N of the machine (V4L2, /dev/videoN), asked for images of this size. Error: no such
-  /// camera.
-  [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open_camera(int number,
-                                                                          const cv::Size& size);
-  /// `is_live`: times are those of the clock, from the first frame on, and no frame is skipped to
-  /// be read again; how a test plays a file as a camera.
+  /// `camera:N`, asked for images of this size; an address, live unless what is there says how many
+  /// frames it has; a file. Error: nothing that can be decoded.
+  [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open(
+      const std::filesystem::path& path, const cv::Size& size);
+  /// `is_live`: times are those of the clock, from the first frame on.
   VideoStream(VideoDecoder decoder, std::string name, bool is_live)
       : decoder_(std::move(decoder)), name_(std::move(name)), is_live_(is_live) {}
 

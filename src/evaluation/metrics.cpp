@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "evaluation/trajectory.hpp"
 #include "geometry/degrees.hpp"
 #include "internal_check.hpp"
 
 namespace stemvo {
-
 namespace {
 
 constexpr std::size_t kFirstFrameStep = 10;  // devkit: every 10th frame starts a segment
@@ -27,7 +25,6 @@ std::vector<Eigen::Vector3d> positions(std::span<const Rigid3> poses) {
   return result;
 }
 
-/// Metres driven up to each frame.
 std::vector<double> distances_m(std::span<const Rigid3> poses) {
   std::vector<double> result(poses.size(), 0.0);
   for (std::size_t i = 1; i < poses.size(); ++i) {
@@ -53,7 +50,6 @@ Trajectory align(std::span<const Rigid3> estimate,
                    estimate);
 }
 
-/// Root mean square distance of positions.
 double rmse_m(std::span<const Eigen::Vector3d> estimate, std::span<const Eigen::Vector3d> truth) {
   double sum = 0.0;
   for (std::size_t i = 0; i < estimate.size(); ++i) {
@@ -82,7 +78,6 @@ Rigid3 motion_error(std::span<const Rigid3> estimate,
   return estimated.inverse() * truth;
 }
 
-/// The RPE.
 void add_step_errors(std::span<const Rigid3> estimate,
                      std::span<const Rigid3> ground_truth,
                      Metrics& metrics) {

@@ -69,7 +69,6 @@ struct TimePairs {
                                      std::span<const double> second_s,
                                      double tolerance_s);
 
-/// The poses of the indices, in their order.
 [[nodiscard]] Trajectory take_poses(std::span<const Rigid3> poses,
                                     std::span<const std::size_t> indices);
 

@@ -12,19 +12,11 @@
 
 // The assembler puts the files into the program as they are: as arrays of C++ they would take
 // longer to compile than everything else.
-#define STEMVO_ASSET(name, file)                                   \
-  __asm__(                                                         \
-      ".section .rodata\n"                                         \
-      ".globl " #name                                              \
-      "_begin\n"                                                   \
-      ".hidden " #name "_begin\n" #name "_begin:\n.incbin \"" file \
-      "\"\n"                                                       \
-      ".globl " #name                                              \
-      "_end\n"                                                     \
-      ".hidden " #name "_end\n" #name                              \
-      "_end:\n"                                                    \
-      ".previous\n");                                              \
-  extern "C" const char name##_begin[];                            \
+#define STEMVO_ASSET(name, file)                                                    \
+  __asm__(".section .rodata\n.globl " #name "_begin, " #name "_end\n.hidden " #name \
+          "_begin, " #name "_end\n" #name "_begin:\n.incbin \"" file "\"\n" #name   \
+          "_end:\n.previous\n");                                                    \
+  extern "C" const char name##_begin[];                                             \
   extern "C" const char name##_end[]
 
 STEMVO_ASSET(stemvo_page_html, STEMVO_PAGE_HTML);

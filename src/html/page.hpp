@@ -16,7 +16,6 @@
 /// page.html, which every page holds, make figures of them.
 namespace stemvo::html {
 
-/// An image under its text.
 struct CaptionedImage {
   std::string caption;
   std::string jpeg;     ///< the file's bytes
@@ -28,9 +27,8 @@ struct CaptionedImage {
 /// {x, y, z}: lists of metres to the fifth decimal, null where a position is not finite.
 [[nodiscard]] nlohmann::ordered_json path_json(std::span<const Rigid3> poses);
 
-/// Writes one HTML file that holds all it needs to be shown without a network. `content` is what
-/// the script of its key `page` (run) says. Texts are never taken
-/// for HTML. Error: the file cannot be written.
+/// Writes one HTML file that holds all it needs. `content` is what the script of its key `page`
+/// says. Texts are never taken for HTML. Error: the file cannot be written.
 [[nodiscard]] Status write_page(const std::filesystem::path& file,
                                 const nlohmann::ordered_json& content);
 

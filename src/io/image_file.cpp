@@ -75,8 +75,6 @@ class JpegDecoder {
   bool is_known_ = false;
 };
 
-/// Sets what the image's values are.
-/// The number that EXIF says in a JPEG; 1 where it says none.
 int exif_orientation(Bytes bytes) {
   constexpr unsigned kExif = 0x45786966;
   constexpr unsigned kOrientation = 0x112;
@@ -128,25 +126,6 @@ void measure_levels(const cv::Mat& image, ImageKind& kind) {
   kind.peak = largest - static_cast<int>(peak - counts.rbegin());
 }
 
-}  // namespace
-
-Levels used_levels(const std::vector<ImageKind>& kinds) {
-  Levels used{65535, 0};
-  int peak = 0;
-  for (const ImageKind& kind : kinds) {
-    if (kind.used) {
-      used = {std::min(used.low, kind.used->low), std::max(used.high, kind.used->high)};
-      peak = std::max(peak, kind.peak);
-    }
-  }
-  const int top = static_cast<int>(std::bit_ceil(static_cast<unsigned>(peak) + 1U)) - 1;
-  const int span = used.high - used.low;
-  if (span <= 0 || 4 * span >= top) {
-    return span < 0 ? Levels() : Levels{0, std::max(top, 255)};
-  }
-  return {std::max(0, used.low - span / 2), std::min(65535, used.high + span / 2)};
-}
-
 Expected<cv::Mat> decode_image(Bytes bytes,
                                const std::string& name,
                                bool as_color,
@@ -168,13 +147,32 @@ Expected<cv::Mat> decode_image(Bytes bytes,
                           bytes.empty() ? "an empty file" : "another kind of file"));
 }
 
+}  // namespace
+
+Levels used_levels(const std::vector<ImageKind>& kinds) {
+  Levels used{65535, 0};
+  int peak = 0;
+  for (const ImageKind& kind : kinds) {
+    if (kind.used) {
+      used = {std::min(used.low, kind.used->low), std::max(used.high, kind.used->high)};
+      peak = std::max(peak, kind.peak);
+    }
+  }
+  const int top = static_cast<int>(std::bit_ceil(static_cast<unsigned>(peak) + 1U)) - 1;
+  const int span = used.high - used.low;
+  if (span <= 0 || 4 * span >= top) {
+    return span < 0 ? Levels() : Levels{0, std::max(top, 255)};
+  }
+  return {std::max(0, used.low - span / 2), std::min(65535, used.high + span / 2)};
+}
+
 Expected<ImageKind> read_image_kind(const fs::path& file) {
   return read_text_file(file).and_then([&](const std::string& text) {
     const Bytes bytes = bytes_of(text);
     const bool is_color =
         is_png(bytes) ? is_color_png(bytes) : is_jpeg(bytes) && JpegDecoder(bytes).is_color();
     const auto image = is_png(bytes) ? decode_png(bytes, file.string(), is_color, {}, true)
-                                     : decode_image(bytes, file.string(), is_color);
+                                     : decode_image(bytes, file.string(), is_color, {}, {});
     return image.map([&](const cv::Mat& pixels) {
       ImageKind kind{.size = pixels.size(), .is_color = is_color, .used = std::nullopt};
       kind.orientation = is_jpeg(bytes) ? exif_orientation(bytes) : 1;

@@ -20,7 +20,6 @@ struct Levels {
   bool operator==(const Levels&) const = default;
 };
 
-/// Properties that all images of a folder share.
 struct ImageKind {
   cv::Size size;
   bool is_color = false;
@@ -33,22 +32,15 @@ struct ImageKind {
 /// they use less than a quarter of these, and half of that more to both sides.
 [[nodiscard]] Levels used_levels(const std::vector<ImageKind>& kinds);
 
-/// A PNG or a JPEG, told by its first bytes and decoded whole, as 8-bit image: gray (CV_8UC1), or
-/// RGB (CV_8UC3) if `as_color`. Errors (file named): neither, cut off, damaged, of another size. A
-/// JPEG keeps the sensor's rows and columns: the calibration knows nothing of a wish to be shown
-/// turned (EXIF).
+/// A PNG or a JPEG, told by its first bytes, as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if
+/// `as_color`, in the sensor's rows and columns: the calibration knows nothing of EXIF's turn.
+/// Errors (file named): neither, cut off, damaged, of another size.
 [[nodiscard]] Expected<cv::Mat> read_image(const std::filesystem::path& file,
                                            bool as_color,
                                            const WantedSize& wanted = {},
                                            const Levels& levels = {});
 /// Size and colours of an image that read_image takes.
 [[nodiscard]] Expected<ImageKind> read_image_kind(const std::filesystem::path& file);
-/// Does the same with a file's bytes; `name` starts its errors.
-[[nodiscard]] Expected<cv::Mat> decode_image(Bytes bytes,
-                                             const std::string& name,
-                                             bool as_color,
-                                             const WantedSize& wanted = {},
-                                             const Levels& levels = {});
 
 /// 8-bit image, gray or RGB -> the bytes of a JPEG file (baseline, colours at half the size).
 /// `quality`: 1 to 100. Throws std::bad_alloc.

@@ -22,7 +22,6 @@ namespace {
 
 constexpr std::array<std::uint8_t, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 
-/// The first four bytes.
 std::uint32_t big_endian_32(Bytes bytes) {
   return (std::uint32_t{bytes[0]} << 24U) | (std::uint32_t{bytes[1]} << 16U) |
          (std::uint32_t{bytes[2]} << 8U) | std::uint32_t{bytes[3]};
@@ -40,7 +39,6 @@ struct Chunk {
   }
 };
 
-/// Takes the next chunk off the `rest` of a file.
 Chunk next_chunk(Bytes& rest) {
   constexpr std::size_t kFrame = 12;  // length, type and CRC, 4 bytes each
   if (rest.size() < kFrame || big_endian_32(rest) > rest.size() - kFrame) {
@@ -221,7 +219,6 @@ class LibpngReader {
     png_read_end(png_, nullptr);
     return true;
   }
-  /// Pixels of 8 or 16 bits, gray or RGB, without transparency.
   void choose_output(bool as_color) {
     const bool is_color = (png_get_color_type(png_, info_) & PNG_COLOR_MASK_COLOR) != 0;
     png_set_expand(png_);

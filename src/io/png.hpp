@@ -26,14 +26,12 @@ using WantedSize = std::optional<cv::Size>;
                                            const WantedSize& wanted = {},
                                            bool keeps_16_bits = false);
 
-/// The common kind of PNG, which is what KITTI has, by libdeflate: in a third of the time that
-/// libpng and zlib take. Empty: the file is of another kind (other than 8-bit gray, or RGB with
-/// `as_color`; interlaced; with chunks that may change pixels), or something in it is wrong
-/// (checksums are compared). RGB order.
+/// KITTI's kind of PNG (8-bit gray, or RGB with `as_color`), by libdeflate: in a third of the time
+/// that libpng and zlib take. Empty: another kind (interlaced, with chunks that may change pixels),
+/// or something in it is wrong (checksums are compared).
 [[nodiscard]] cv::Mat decode_plain_png(Bytes bytes, bool as_color);
 
-/// Every kind of PNG, by libpng: palettes, 16 bits a value, transparency (left out), interlaced.
-/// Empty: damaged. Throws std::bad_alloc.
+/// Every kind of PNG, by libpng, without transparency. Empty: damaged. Throws std::bad_alloc.
 [[nodiscard]] cv::Mat decode_any_png(Bytes bytes, bool as_color, bool keeps_16_bits = false);
 
 /// 8-bit image, gray or RGB -> the bytes of a PNG file. `is_fast`: larger, sooner. Throws

@@ -16,6 +16,8 @@ bool is_inside(const Rule& rule, double value) {
   return std::isfinite(value) && value >= rule.min && value <= rule.max && is_odd;
 }
 
+}  // namespace
+
 std::string number_violation(std::string_view kind, double value, const Rule& rule) {
   if (is_inside(rule, value)) {
     return {};
@@ -27,18 +29,8 @@ std::string number_violation(std::string_view kind, double value, const Rule& ru
   return fmt::format("expected {}{}, found {}", kind, range, value);
 }
 
-}  // namespace
-
 std::string full_name(std::string_view section, std::string_view key) {
   return section.empty() ? std::string(key) : fmt::format("{}.{}", section, key);
-}
-
-std::string violation_of(int value, const Rule& rule) {
-  return number_violation("a whole number", value, rule);
-}
-
-std::string violation_of(double value, const Rule& rule) {
-  return number_violation("a number", value, rule);
 }
 
 std::string violation_of(const std::vector<double>& values, const Rule& rule) {

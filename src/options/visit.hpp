@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <concepts>
-#include <cstdint>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -17,9 +16,8 @@
 #include "stemvo/error.hpp"
 #include "stemvo/options.hpp"
 
-/// One visit() per struct of options tells every key's name, value, range and help. Writing,
-/// reading, checking and explaining options are visitors of
-/// (section, key, value, rule, help), where the options, and so the values, may be const.
+/// One visit() per struct of options tells every key: visitors of (section, key, value, rule, help)
+/// write, read, check and explain options, which may be const.
 namespace stemvo::options {
 
 /// The values a key may have. Bounds hold for every element of a list; infinite and NaN never pass.
@@ -37,31 +35,24 @@ struct Rule {
   }
 };
 
+template <typename... Text>
+constexpr std::array<std::string_view, sizeof...(Text)> names(Text... text) {
+  return {text...};
+}
 /// Names of the enumerators, by their numbers.
+constexpr auto names_of(TrackingResolution) {
+  return names("auto", "input", "input_zoomed", "half", "native");
+}
+constexpr auto names_of(FeatureMethod) { return names("patch", "klt", "orb", "sift"); }
+constexpr auto names_of(RobustEstimator) { return names("magsac", "ransac"); }
+constexpr auto names_of(OdometryMode) { return names("two_frame", "map"); }
+constexpr auto names_of(Composition) { return names("right", "paper"); }
+constexpr auto names_of(ForwardGate) { return names("translation", "paper", "off"); }
+constexpr auto names_of(CameraRefinement) { return names("off", "principal_point", "all"); }
+constexpr auto names_of(ScaleSource) { return names("none", "constant_speed", "camera_height"); }
+constexpr auto names_of(RoadEstimators) { return names("both", "dense", "points"); }
 template <typename Enum>
-inline constexpr std::array<std::string_view, 0> kNames{};
-template <>
-inline constexpr std::array<std::string_view, 5> kNames<TrackingResolution>{
-    "auto", "input", "input_zoomed", "half", "native"};
-template <>
-inline constexpr std::array<std::string_view, 4> kNames<FeatureMethod>{"patch", "klt", "orb",
-                                                                       "sift"};
-template <>
-inline constexpr std::array<std::string_view, 2> kNames<RobustEstimator>{"magsac", "ransac"};
-template <>
-inline constexpr std::array<std::string_view, 2> kNames<OdometryMode>{"two_frame", "map"};
-template <>
-inline constexpr std::array<std::string_view, 2> kNames<Composition>{"right", "paper"};
-template <>
-inline constexpr std::array<std::string_view, 3> kNames<ForwardGate>{"translation", "paper", "off"};
-template <>
-inline constexpr std::array<std::string_view, 3> kNames<CameraRefinement>{"off", "principal_point",
-                                                                          "all"};
-template <>
-inline constexpr std::array<std::string_view, 3> kNames<ScaleSource>{"none", "constant_speed",
-                                                                     "camera_height"};
-template <>
-inline constexpr std::array<std::string_view, 3> kNames<RoadEstimators>{"both", "dense", "points"};
+inline constexpr auto kNames = names_of(Enum{});
 
 template <typename T>
 concept Enumeration = std::is_enum_v<T>;
@@ -82,12 +73,15 @@ template <Enumeration Enum>
 [[nodiscard]] std::string full_name(std::string_view section, std::string_view key);
 
 /// "expected ..., found ..." where the rule refuses the value, else nothing.
-[[nodiscard]] std::string violation_of(int value, const Rule& rule);
-[[nodiscard]] std::string violation_of(double value, const Rule& rule);
+[[nodiscard]] std::string number_violation(std::string_view kind, double value, const Rule& rule);
+template <typename N>
+  requires std::is_arithmetic_v<N>
+[[nodiscard]] std::string violation_of(N value, const Rule& rule) {
+  return number_violation(std::is_floating_point_v<N> ? "a number" : "a whole number",
+                          static_cast<double>(value), rule);
+}
 [[nodiscard]] std::string violation_of(const std::vector<double>& values, const Rule& rule);
 [[nodiscard]] std::string violation_of(const std::string& value, const Rule& rule);
-[[nodiscard]] inline std::string violation_of(bool, const Rule&) { return {}; }
-[[nodiscard]] inline std::string violation_of(std::uint64_t, const Rule&) { return {}; }
 template <Enumeration Enum>
 [[nodiscard]] std::string violation_of(Enum value, const Rule&) {
   const auto number = static_cast<std::size_t>(value);
@@ -113,7 +107,6 @@ struct Checker {
   Status status;
 };
 
-/// A struct of options, or a const one.
 template <typename T, typename Struct>
 concept Is = std::derived_from<std::remove_const_t<T>, Struct>;
 

@@ -15,13 +15,12 @@
 #include "evaluation/trajectory.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/result_files.hpp"
+#include "report/data_files.hpp"
 #include "report/frame_image.hpp"
-#include "report/frames_csv.hpp"
 #include "timing/stage_timer.hpp"
 #include "try.hpp"
 
 namespace stemvo::pipeline {
-
 namespace {
 
 using Clock = std::chrono::steady_clock;

@@ -11,10 +11,8 @@
 #include "try.hpp"
 
 namespace stemvo::pipeline {
-
 namespace {
 
-/// First and last time of the frames; a stream's are not known yet.
 std::optional<std::pair<double, double>> span_of(const FrameSource& sequence) {
   const auto& times_s = sequence.timestamps_s;
   return sequence.stream || times_s.empty()

@@ -10,7 +10,6 @@
 #include <opencv2/core/utility.hpp>
 #include <tbb/global_control.h>
 
-#include "config/config.hpp"
 #include "dataset/frame_source.hpp"
 #include "dataset/motion_file.hpp"
 #include "odometry/phased_odometry.hpp"
@@ -21,7 +20,6 @@
 
 namespace stemvo::pipeline {
 
-/// Facts on a recording's motion beside its frames.
 struct BesideFrames {
   std::vector<Way> ways;                ///< by speeds
   std::vector<dataset::GyroRow> gyro;   ///< in the camera's axes
@@ -34,7 +32,6 @@ struct BesideFrames {
   };
   std::vector<Span> spans;  ///< of the files read
 
-  /// For the frame of this time, behind one of that time.
   [[nodiscard]] FrameHints hints(double last_s, double time_s) const;
   /// A line for each file whose times are all before or all behind those of the frames.
   [[nodiscard]] std::vector<std::string> warnings(double first_s, double last_s) const;
@@ -51,16 +48,14 @@ struct BesideFrames {
 using FrameVisitor =
     std::function<bool(std::size_t index, const Expected<cv::Mat>& frame, const FrameResult& pose)>;
 
-/// Takes the frames of a sequence through an odometry, read here and worked on in
-/// OdometryLoops. What a stage or the visitor throws leaves this function; frames behind the last
-/// one visited are dropped then.
+/// Takes the frames of a sequence through an odometry. What a stage or the visitor throws leaves
+/// this function; frames behind the last one visited are dropped then.
 void run_frames(const FrameSource& sequence,
                 PhasedOdometry& odometry,
                 const FrameVisitor& visit,
                 const BesideFrames& beside = {});
 
-/// While it lives, OpenCV works on `num_threads` threads (0: one per core) in the whole process:
-/// the program's part of --threads. The library leaves OpenCV alone.
+/// While it lives, OpenCV works on `num_threads` threads (0: one per core) in the whole process.
 class ThreadScope {
  public:
   explicit ThreadScope(int num_threads)

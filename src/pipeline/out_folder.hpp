@@ -12,11 +12,9 @@
 
 namespace stemvo::pipeline {
 
-/// While one lives no other process writes into the folder, as far as it asks for a lock too. An
-/// advisory lock of the folder itself: the kernel lets go of it however the process ends.
+/// An advisory lock of a folder: the kernel lets go of it however the process ends.
 using FolderLock = std::shared_ptr<void>;
 
-/// Creates the folder and those above it.
 [[nodiscard]] Status create_out_folder(const std::filesystem::path& folder);
 
 /// Whether this command ("run", ..) made the folder: the mark in it, the file .stemvo, says so.
@@ -25,9 +23,9 @@ using FolderLock = std::shared_ptr<void>;
 /// Creates results/NAME, or results/NAME_2, _3 .. where that is taken.
 [[nodiscard]] Expected<std::filesystem::path> create_results_folder(const std::string& name);
 
-/// Creates the folder with the command's mark and locks it; every command with a folder asks for it
-/// so. Errors: it holds files but no mark of this command; one of the `inputs` lies in it, also
-/// through a link; it cannot be written; another process has it now.
+/// Creates the folder with the command's mark and locks it. Errors: it holds files but no mark of
+/// this command; one of the `inputs` lies in it, also through a link; it cannot be written; another
+/// process has it now.
 [[nodiscard]] Expected<FolderLock> open_out_folder(
     const std::filesystem::path& folder,
     const std::string& command,

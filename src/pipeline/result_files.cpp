@@ -3,24 +3,24 @@
 
 #include <algorithm>
 #include <chrono>
-#include <optional>
 #include <span>
-#include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "geometry/degrees.hpp"
+#include "geometry/median.hpp"
 #include "options/visit.hpp"
+#include "report/data_files.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/frame_image.hpp"
-#include "report/frames_csv.hpp"
-#include "report/run_page.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
+
 namespace {
 
 std::string describe_numbers(const MetricsReport& report) {
@@ -46,7 +46,6 @@ std::string describe_frames(const FrameSource& sequence, std::size_t num_frames)
   return one_line(fmt::format("frames {}:{} of {}", begin, end, sequence.name));
 }
 
-/// The share of frames for which the predicate holds.
 template <typename Predicate>
 double share_of(const std::vector<FrameResult>& frames, const Predicate& is_one) {
   return static_cast<double>(std::ranges::count_if(frames, is_one)) /
@@ -129,10 +128,9 @@ class ResultWriter {
     if (map_ && report.map) {
       map = {in_truth(map_->trajectory, report), loops_of(map_->whole.kept)};
     }
-    return write_run_page(
-        request_.out_dir / "report.html",
-        {plot.title, plot.subtitle, plot.unit, report, csv_, plot.estimate, map, truth_,
-         drive_.images, drive_.small_frames.images(), config_text_, request_.command});
+    return write_run_page(request_.out_dir / "report.html",
+                          {plot, report, csv_, map, truth_, drive_.images,
+                           drive_.small_frames.images(), config_text_, request_.command});
   }
 
  private:
@@ -162,7 +160,6 @@ class ResultWriter {
     return written;
   }
 
-  /// The map of the run: files, and its part of the report.
   [[nodiscard]] Status write_map(MetricsReport& report) {
     map_ = finish_map(run_);
     Status written = write_map_ply(run_, *map_);
@@ -227,7 +224,6 @@ class ResultWriter {
     return report;
   }
 
-  /// Speeds were given, and met the frames.
   [[nodiscard]] bool has_speeds() const {
     return !run_.beside.ways.empty() &&
            std::ranges::any_of(drive_.frames, [](const FrameResult& frame) {
@@ -283,6 +279,26 @@ class ResultWriter {
   Status matched_;                ///< the ground truth of a stream
 };
 
+/// Written units per unit of the estimate around a frame: the median over steps, since one that
+/// ends the wait for a first map spans many frames. Frames stay where no step was measured.
+double stretch_at(std::span<const Similarity3> estimated,
+                  std::span<const Rigid3> written,
+                  std::size_t frame) {
+  constexpr std::size_t kStepsAround = 5;  // to both sides
+  const auto step = [](const auto& poses, std::size_t i) {
+    return (poses[i].translation - poses[i - 1].translation).norm();
+  };
+  std::vector<double> stretches;
+  const std::size_t begin = frame - std::min(frame, kStepsAround);
+  const std::size_t end = std::min(frame + kStepsAround + 1, estimated.size());
+  for (std::size_t i = begin + 1; i < end; ++i) {
+    if (const double before = step(estimated, i); before > 0.0) {
+      stretches.push_back(step(written, i) / before);
+    }
+  }
+  return stretches.empty() ? 1.0 : median(stretches);
+}
+
 }  // namespace
 
 std::string count_matched(const RunRequest& request,
@@ -329,9 +345,53 @@ Status write_results(const Run& run, const Drive& drive, MetricsReport& report) 
     report.timing->num_frames = report.num_frames;
     report.timing->num_threads = run.odometry.num_threads();
   }
-  keep_first(written, write_metrics_json(run.request.out_dir / "metrics.json", report));
+  keep_first(written, write_text_file(run.request.out_dir / "metrics.json",
+                                      to_text(metrics_document(report))));
   keep_first(written, writer.write_page(report));
   return written;
+}
+
+MapResult finish_map(const Run& run) {
+  MapResult map{WholeMap(run.odometry), {}};
+  if (run.request.adjust_map || !map.whole.kept.loops.empty()) {
+    const auto start = std::chrono::steady_clock::now();
+    (void)map.whole.adjust();  // no covariances: no error
+    map.adjustment_s =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  } else {
+    map.whole.close_loops();
+  }
+  for (const Similarity3& placed : map.whole.map_from_frame) {
+    map.trajectory.emplace_back(placed.rotation, placed.translation);
+  }
+  if (run.request.config.scale_choice == ScaleChoice::kGroundTruth) {
+    map.trajectory = rescale_steps(
+        map.trajectory, std::span(run.sequence.ground_truth->poses).first(map.trajectory.size()));
+  }
+  return map;
+}
+
+std::vector<std::pair<std::size_t, std::size_t>> loops_of(const KeptMap& map) {
+  std::vector<std::pair<std::size_t, std::size_t>> frames;
+  for (const auto& [from, to] : frames_of_loops(map)) {
+    if (from >= 0) {
+      frames.emplace_back(from, to);
+    }
+  }
+  return frames;
+}
+
+Status write_map_ply(const Run& run, const MapResult& map) {
+  std::vector<ColoredPoint> points;
+  for (const KeptLandmark& landmark : map.whole.landmarks) {
+    const auto frame = static_cast<std::size_t>(landmark.frame);
+    const Similarity3& placed = map.whole.map_from_frame[frame];
+    const Eigen::Vector3d in_camera = placed.scale *
+                                      stretch_at(map.whole.map_from_frame, map.trajectory, frame) *
+                                      landmark.in_camera.cast<double>();
+    points.push_back({(map.trajectory[frame] * in_camera).cast<float>(), landmark.rgb});
+  }
+  return stemvo::write_map_ply(run.request.out_dir / "map.ply", points, map.trajectory);
 }
 
 }  // namespace stemvo::pipeline

@@ -55,7 +55,6 @@ inline constexpr std::array kResultNames = {"config.yaml",
                                             "map.ply",
                                             ".stemvo_video"};  // names the video in the folder
 
-/// A run refers to its request, its frames and its odometry.
 struct Run {
   const RunRequest& request;
   const FrameSource& sequence;
@@ -64,7 +63,6 @@ struct Run {
   const DriveVideo& video;
 };
 
-/// The loop over the frames leaves this behind.
 struct Drive {
   std::vector<FrameResult> frames;           ///< one per frame done
   Trajectory trajectory;                     ///< as result files hold it
@@ -93,21 +91,17 @@ void keep_first(Status& first, Status next);
 /// frames and model made the results. `num_frames`: of a stream, those read; 0: not yet known.
 [[nodiscard]] std::string config_text(const Run& run, std::size_t num_frames);
 
-/// Everything that is written at the end; `report` becomes what metrics.json holds:
-/// trajectory_kitti.txt, trajectory_tum.txt, config.yaml (`stemvo run --config` takes it as it is),
-/// trajectory.png, metrics.json, report.html; mode map: map.ply and, with loops,
-/// trajectory_map_kitti.txt, trajectory_map_tum.txt and the map to be saved.
+/// Writes all results but pictures; `report` becomes what metrics.json holds.
 [[nodiscard]] Status write_results(const Run& run, const Drive& drive, MetricsReport& report);
 
-/// The map of a run that is over.
 struct MapResult {
   WholeMap whole;
   Trajectory trajectory;                              ///< of all frames, as result files hold it
   std::optional<double> adjustment_s = std::nullopt;  ///< it took
 };
 
-/// Takes in what the run remembers, adjusted where places were seen again, or where that is asked
-/// for; with scale.source=ground_truth steps get their true length.
+/// Adjusted where places were seen again, or where that is asked for; with
+/// scale.source=ground_truth steps get their true length.
 [[nodiscard]] MapResult finish_map(const Run& run);
 
 /// Pairs of frames of this run that show one place.

@@ -2,20 +2,23 @@
 #include "pipeline/run.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
+#include "dataset/frame_files.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
+#include "report/frame_image.hpp"
+#include "stem/stem.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
 #include "try.hpp"
 
 namespace stemvo {
+
 namespace {
 
 using pipeline::Run;
@@ -105,7 +108,6 @@ std::string describe_size(const FrameSource& sequence) {
   return fmt::format("{} of {}x{} pixels{}", count, full.width, full.height, worked_on);
 }
 
-/// Says what the input was taken for, and what is lost.
 void note_start(const Run& run, bool is_replacing) {
   const auto& [request, sequence, odometry, beside, video] = run;
   if (!request.note) {
@@ -170,10 +172,7 @@ Expected<RunSummary> run_source(RunRequest request,
   auto inputs = pipeline::input_files(request, sequence, request.config);
   inputs.insert(inputs.end(),
                 {request.speeds.value_or(""), request.gyro.value_or(""), request.map.value_or("")});
-  const auto lock = pipeline::open_out_folder(request.out_dir, "run", inputs);
-  if (!lock) {
-    return lock.error();
-  }
+  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(request.out_dir, "run", inputs));
   // Before anything is removed: a wrong name costs no earlier result.
   if (request.saved_map) {
     STEMVO_TRY(check_can_write(*request.saved_map));
@@ -201,6 +200,50 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   const pipeline::ThreadScope scope(resolved.config.threads);
   STEMVO_TRY_GET(const auto sequence, open_sequence(resolved));
   return run_source(std::move(resolved), sequence, progress);
+}
+
+Expected<ChannelImagesReport> write_channel_images(const ChannelImagesRequest& request,
+                                                   const RunProgress& progress) {
+  STEMVO_TRY(validate(request.config));
+  FrameSourceRequest source = request;
+  source.camera = request.config.input.camera;
+  STEMVO_TRY_GET(const auto sequence, open_source(source));
+  STEMVO_TRY_GET(const Stem stem, Stem::load_all(request.config.stem));
+  STEMVO_TRY_GET(
+      const FrameRange filters,
+      dataset::resolve_range(request.filters, static_cast<std::size_t>(stem.info().num_filters),
+                             stem.info().model, "filters"));
+  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(
+                                      request.out_dir, "channel",
+                                      pipeline::input_files(request, sequence, request.config)));
+  std::size_t num_written = 0;
+  const auto save = [&](const cv::Mat& image, std::size_t number, const std::string& name) {
+    ++num_written;
+    return write_image(request.out_dir / fmt::format("{:06}_{}.png", number, name), image);
+  };
+  // Each filter keeps its own contrast limits.
+  std::vector<ContrastNormalization> contrasts(filters.end - filters.begin,
+                                               ContrastNormalization(request.config.stem));
+  bool goes_on = true;
+  for (std::size_t i = 0; i < sequence.size() && goes_on; ++i) {
+    const std::size_t number = sequence.range.begin + i;
+    STEMVO_TRY_GET(const cv::Mat frame, sequence.read(i));
+    if (frame.empty()) {  // behind a stream's last
+      break;
+    }
+    STEMVO_TRY_GET(const auto channels, stem.apply_all(frame));
+    std::vector<cv::Mat> images = {frame};
+    std::vector<std::string> captions = {fmt::format("input, frame {}", number)};
+    STEMVO_TRY(save(frame, number, "input"));
+    for (std::size_t k = filters.begin; k < filters.end; ++k) {
+      images.push_back(contrasts[k - filters.begin].apply(channels[k]).pixels);
+      captions.push_back(fmt::format("{} filter {}", request.config.stem.model, k));
+      STEMVO_TRY(save(images.back(), number, fmt::format("filter_{:03}", k)));
+    }
+    STEMVO_TRY(save(draw_sheet(images, captions), number, "sheet"));
+    goes_on = !progress || progress(i + 1, sequence.size());
+  }
+  return ChannelImagesReport{num_written, sequence.remarks()};
 }
 
 }  // namespace stemvo

@@ -17,8 +17,7 @@
 
 namespace stemvo {
 
-/// Everything `stemvo run` was asked for. The camera is that of `config`, the height
-/// as dataset::with_camera_height says.
+/// The camera is that of `config`, the height as dataset::with_camera_height says.
 struct RunRequest : FrameSourceRequest {
   std::filesystem::path out_dir;  ///< empty: a new results/NAME
   Config config;
@@ -43,7 +42,6 @@ struct RunRequest : FrameSourceRequest {
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };
 
-/// A run's outcome. Every file is written, also after an interrupt.
 struct RunSummary {
   MetricsReport report;               ///< what metrics.json holds
   std::filesystem::path out_dir;      ///< where all of it is
@@ -58,12 +56,29 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
 /// (kResultNames, pictures/%06d.png); an earlier run's are removed when this one starts. A wrong
-/// request (configuration, sequence, ground truth that scale.source needs, model, out_dir that
-/// cannot be written) is an error before work starts. A frame that cannot be read is a warning and
-/// gets a pose. When a result cannot be written the others still are; `written` says so. One run
-/// with measure_times at a time in a process. OpenCV is told, for the whole process, how many
-/// threads it may use. `progress` may be called from another thread.
+/// request is an error before work starts; a frame that cannot be read is a warning and gets a
+/// pose; when a result cannot be written the others still are. One run with measure_times at a time
+/// in a process. OpenCV is told, for the whole process, how many threads it may use. `progress` may
+/// be called from another thread.
 [[nodiscard]] Expected<RunSummary> run_sequence(const RunRequest& request,
                                                 const RunProgress& progress = {});
+
+struct ChannelImagesRequest : FrameSourceRequest {
+  std::filesystem::path out_dir;
+  Config config;                             ///< `input` and `stem` are used
+  std::optional<FrameRangeRequest> filters;  ///< half open, as frames; else all of the layer
+};
+
+struct ChannelImagesReport {
+  std::size_t num_written = 0;
+  std::vector<std::string> warnings;  ///< of the recording
+};
+
+/// The paper's Figure 1. For each frame: %06d_input.png, %06d_filter_%03d.png (8 bit, as the front
+/// end sees it) and %06d_sheet.png with all of them.
+/// Errors: those of the sequence and the model, filters outside the layer, an unreadable frame,
+/// out_dir that cannot be written.
+[[nodiscard]] Expected<ChannelImagesReport> write_channel_images(
+    const ChannelImagesRequest& request, const RunProgress& progress = {});
 
 }  // namespace stemvo

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <functional>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -16,42 +15,42 @@
 #include "try.hpp"
 
 namespace stemvo {
-
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The bounds of one key: `{max: 1.0}`, `{min: 0.99}` or both. `where`: file and line.
-std::vector<ThresholdResult> read_bounds(const std::string& key,
-                                         const YAML::Node& node,
-                                         const std::function<std::string(const YAML::Node&)>& where,
-                                         const YAML::Node& name) {
-  ThresholdResult result;
-  result.key = key;
+/// Adds the bounds of one key: `{max: 1.0}`, `{min: 0.99}` or both.
+void add_bounds(const std::filesystem::path& file,
+                const YAML::Node& name,
+                const YAML::Node& node,
+                std::vector<ThresholdResult>& bounds) {
+  const auto where = [&](const YAML::Node& at) {
+    return fmt::format("{}:{}: ", file.string(), at.Mark().line + 1);
+  };
+  const std::string key = name.Scalar();
   if (!name.IsScalar() || !node.IsMap() || node.size() == 0) {
-    result.problem =
-        where(name) +
-        one_line(fmt::format("{}: expected {{max: NUMBER}} or {{min: NUMBER}}, found '{}'", key,
-                             node.IsScalar() ? node.Scalar() : "no bound"));
-    return {result};
+    const std::string found = node.IsScalar() ? node.Scalar() : "no bound";
+    bounds.push_back(
+        {.key = key,
+         .problem = where(name) + one_line(fmt::format(
+                                      "{}: expected {{max: NUMBER}} or {{min: NUMBER}}, found '{}'",
+                                      key, found))});
+    return;
   }
-  std::vector<ThresholdResult> bounds;
   for (const auto& bound : node) {
     const std::string side = bound.first.Scalar();
-    const Expected<std::vector<double>> limit = parse_numbers(bound.second.Scalar(), 1);
-    result.is_max = side == "max";
-    result.limit = limit ? limit->front() : 0.0;
-    result.problem.clear();
-    if (side != "min" && side != "max") {
-      result.problem = fmt::format("{}: expected min or max, found '{}'", key, side);
-    } else if (!limit) {
-      result.problem = fmt::format("{}.{}: {}", key, side, limit.error().message);
-    }
-    result.problem = result.problem.empty() ? "" : where(bound.first) + one_line(result.problem);
-    result.place = where(name);
-    bounds.push_back(result);
+    const auto limit = parse_numbers(bound.second.Scalar(), 1);
+    const std::string problem = side != "min" && side != "max"
+                                    ? fmt::format("{}: expected min or max, found '{}'", key, side)
+                                : limit
+                                    ? ""
+                                    : fmt::format("{}.{}: {}", key, side, limit.error().message);
+    bounds.push_back({.key = key,
+                      .is_max = side == "max",
+                      .limit = limit ? limit->front() : 0.0,
+                      .place = where(name),
+                      .problem = problem.empty() ? "" : where(bound.first) + one_line(problem)});
   }
-  return bounds;
 }
 
 Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::path& file) {
@@ -66,14 +65,9 @@ Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::pa
     return fail(fmt::format("{}: expected lines like 't_rel_percent: {{max: 1.0}}', found none",
                             file.string()));
   }
-  const auto where = [&](const YAML::Node& node) {
-    return fmt::format("{}:{}: ", file.string(), node.Mark().line + 1);
-  };
   std::vector<ThresholdResult> bounds;
   for (const auto& entry : *root) {
-    const std::vector<ThresholdResult> some =
-        read_bounds(entry.first.Scalar(), entry.second, where, entry.first);
-    bounds.insert(bounds.end(), some.begin(), some.end());
+    add_bounds(file, entry.first, entry.second, bounds);
   }
   return bounds;
 }
@@ -97,7 +91,6 @@ const Json* find_metric(const Json& root, std::string_view key) {
   return node;
 }
 
-/// The bounds that a run's numbers put on a later one's.
 Expected<std::vector<ThresholdResult>> read_baseline(const std::filesystem::path& file,
                                                      double tolerance,
                                                      const Json& metrics) {
@@ -111,7 +104,7 @@ Expected<std::vector<ThresholdResult>> read_baseline(const std::filesystem::path
     const Json* number = find_metric(baseline, key);
     if (number != nullptr && number->is_number()) {
       const double share = is_max ? 1.0 + tolerance : 1.0 - tolerance;
-      bounds.push_back({key, is_max, share * number->get<double>(), place, {}, false, ""});
+      bounds.push_back({key, is_max, share * number->get<double>(), place});
     }
   };
   for (const char* group : {"", "map."}) {
@@ -126,20 +119,15 @@ Expected<std::vector<ThresholdResult>> read_baseline(const std::filesystem::path
   for (const char* same :
        {"sequence", "frames", "alignment"}) {  // else the numbers are not comparable
     if (baseline.contains(same) && metrics.contains(same) && baseline[same] != metrics[same]) {
-      bounds.push_back({same,
-                        true,
-                        0.0,
-                        place,
-                        {},
-                        false,
-                        fmt::format("{}{}: expected {} as in the run, found {}", place, same,
-                                    metrics[same].dump(), baseline[same].dump())});
+      bounds.push_back({.key = same,
+                        .place = place,
+                        .problem = fmt::format("{}{}: expected {} as in the run, found {}", place,
+                                               same, metrics[same].dump(), baseline[same].dump())});
     }
   }
   return bounds;
 }
 
-/// Holds one bound against its metric.
 void judge(ThresholdResult& result, const Json& metrics, const std::filesystem::path& file) {
   const Json* metric = find_metric(metrics, result.key);
   if (!result.problem.empty()) {

@@ -18,35 +18,29 @@ struct CheckRequest {
   double tolerance = 0.05;                        ///< share of the baseline's number
 };
 
-/// One bound, held against a metrics.json.
 struct ThresholdResult {
-  std::string key;     ///< dotted, e.g. "ate_rmse_m.none"
-  bool is_max = true;  ///< whether `limit` is a maximum
+  std::string key = {};  ///< dotted, e.g. "ate_rmse_m.none"
+  bool is_max = true;    ///< whether `limit` is a maximum
   double limit = 0.0;
-  std::string place;                            ///< the bound's: "FILE:LINE: " or "FILE: "
+  std::string place = {};                       ///< the bound's: "FILE:LINE: " or "FILE: "
   std::optional<double> number = std::nullopt;  ///< as found; nullopt: null
   bool passed = false;
-  std::string problem;  ///< the bound or the metric cannot be read: why; it did not pass
+  std::string problem = {};  ///< the bound or the metric cannot be read: why; it did not pass
 };
 
-/// Thresholds are YAML: `t_rel_percent: {max: 1.0}`, `tracked_fraction: {min: 0.99}`, nested keys
-/// dotted (`ate_rmse_m.none: {max: 3}`); min and max may stand together and are two results, in the
-/// file's order. A metric that is null fails. A baseline bounds its own errors (t_rel, r_rel,
-/// offset, ATE, RPE, those of the map) from above and tracked_fraction from below, each by the
-/// tolerance. Problems of one bound (file, and line where there is one): other than min and max,
-/// not a finite number, a key the metrics do not have, a metric that is not a number, a baseline of
-/// another recording, other frames or another alignment. Errors: file missing, not JSON, not YAML,
-/// no thresholds.
+/// Thresholds are YAML: `t_rel_percent: {max: 1.0}`, nested keys dotted (`ate_rmse_m.none`); min
+/// and max may stand together and are two results, in the file's order. A metric that is null
+/// fails. A baseline bounds its own errors from above and tracked_fraction from below, by the
+/// tolerance. Problems of one bound: other than min and max, not a finite number, a key the metrics
+/// do not have, a metric that is not a number, a baseline of another recording, other frames or
+/// another alignment. Errors: file missing, not JSON, not YAML, no thresholds.
 [[nodiscard]] Expected<std::vector<ThresholdResult>> check_metrics(const CheckRequest& request);
 
-/// False when any bound was passed or has a problem.
 [[nodiscard]] bool all_passed(const std::vector<ThresholdResult>& results);
 
-/// Aligned table, one line per bound and a summary line; ends with a newline.
 [[nodiscard]] std::string format_check_table(const std::vector<ThresholdResult>& results);
 
-/// JUnit's XML: a test case per bound; `name` is the suite's. A problem is an error, a bound that
-/// was passed a failure.
+/// JUnit's XML: a test case per bound; a problem is an error, a bound that was passed a failure.
 [[nodiscard]] std::string format_junit(const std::vector<ThresholdResult>& results,
                                        const std::string& name);
 

@@ -13,18 +13,15 @@
 #include "try.hpp"
 
 namespace stemvo {
-
 namespace {
 
 constexpr std::array<std::string_view, 4> kAlignments = {"none", "scale", "se3", "sim3"};
 
-/// The poses of the two files that belong together.
 struct Pairs {
   Trajectory estimate;
   Trajectory truth;
 };
 
-/// The poses of the range, and their times where they have some.
 void cut(PoseFile& file, const FrameRange& range) {
   const auto part = [&range](auto& all) {
     all = {all.begin() + static_cast<std::ptrdiff_t>(range.begin),

@@ -17,7 +17,6 @@
 
 namespace stemvo {
 
-/// Everything `stemvo evaluate` was asked for.
 struct EvaluationRequest {
   std::filesystem::path ground_truth;            ///< KITTI's, TUM's or EuRoC's format
   std::vector<std::filesystem::path> estimates;  ///< the same
@@ -28,8 +27,6 @@ struct EvaluationRequest {
   std::optional<FrameRangeRequest> frames = std::nullopt;  ///< of the ground truth's poses
 };
 
-/// One estimate. t_rel, r_rel and the offset are those after the alignment asked for; `ate_rmse`
-/// holds all four alignments.
 struct EvaluationRow {
   std::string name;  ///< the path as given, or "(zero motion)"
   Metrics metrics;
@@ -45,17 +42,14 @@ struct EvaluationReport {
   EvaluationRow zero_motion;        ///< the baseline that stays at the origin
 };
 
-/// Poses are matched by time (pair_by_time) where both files have times, else line by line; an
-/// estimate without times has a pose for each line of the ground truth, or of its `frames`. Both
-/// then start at the identity. Errors: those of the readers; without times another number of poses
-/// than the ground truth; with times fewer than two pairs.
+/// Poses are matched by time where both files have times, else line by line. Both then start at the
+/// identity. Errors: those of the readers; without times another number of poses than the ground
+/// truth, or its `frames`; with times fewer than two pairs.
 [[nodiscard]] Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request);
 
-/// One aligned row per estimate and the zero-motion baseline; names the alignment. Ends with a
-/// newline.
 [[nodiscard]] std::string format_evaluation_table(const EvaluationReport& report);
-/// The same as JSON: {ground_truth, poses, alignment, estimates: [{file, t_rel_percent, ...}],
-/// zero_motion: {...}}, with the keys of metrics.json.
+/// {ground_truth, poses, alignment, estimates: [{file, ..}], zero_motion: {..}}: keys of
+/// metrics.json.
 [[nodiscard]] nlohmann::ordered_json evaluation_document(const EvaluationReport& report);
 
 /// `none`, `scale`, `se3`, `sim3`. Error: another word (lists the known ones).

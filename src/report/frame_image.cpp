@@ -14,7 +14,6 @@
 #include "text/text_file.hpp"
 
 namespace stemvo {
-
 namespace {
 
 constexpr int kBand_px = 40;  // above a frame's images: the caption
@@ -32,7 +31,6 @@ constexpr double kSheetAspect = 1.4;  // width over height aimed at
 const cv::Scalar kPaper(255, 255, 255);
 const cv::Scalar kInk(34, 34, 34);
 
-/// A copy as CV_8UC3, RGB, from gray or RGB.
 cv::Mat to_rgb(const cv::Mat& image) {
   STEMVO_CHECK(image.type() == CV_8UC1 || image.type() == CV_8UC3, "8-bit gray or RGB");
   cv::Mat rgb = image.clone();
@@ -76,7 +74,6 @@ cv::Point to_subpixels(const Eigen::Vector2d& uv) {
   return {cvRound(scaled.x()), cvRound(scaled.y())};
 }
 
-/// `to_image` maps input pixels to pixels of `rgb`.
 template <typename Map>
 void draw_matches(cv::Mat& rgb,
                   const Matches& matches,

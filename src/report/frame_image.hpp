@@ -15,11 +15,10 @@
 
 namespace stemvo {
 
-/// The paper's "optical flow": the input above, the channel below at the same width, on both the
-/// matches as lines from the previous to the current position. Inliers are coloured by the length
-/// of their flow, outliers thin and red. Frame: CV_8UC1 or CV_8UC3 (RGB); may be empty (an
-/// unreadable frame: the channel alone), as may the channel. `inlier_mask` has one entry per match,
-/// or is empty (all count as outliers). Returns CV_8UC3, RGB.
+/// The paper's "optical flow": the input (CV_8UC1 or RGB) above, the channel below at the same
+/// width (each may be empty), on both the matches as lines from the previous to the current
+/// position: inliers coloured by the length of their flow, outliers thin and red. `inlier_mask`: an
+/// entry per match, or empty (all are outliers). CV_8UC3, RGB.
 [[nodiscard]] cv::Mat draw_frame_image(const cv::Mat& frame,
                                        const ChannelImage& channel,
                                        const Matches& matches,
@@ -37,19 +36,17 @@ namespace stemvo {
 [[nodiscard]] cv::Mat draw_sheet(const std::vector<cv::Mat>& images,
                                  const std::vector<std::string>& captions);
 
-/// One line of text, centred in the height of `box`, `share` of the room left over before it;
-/// shrinks until it fits. OpenCV's fonts know ASCII only: any other byte becomes a '?'. Returns
-/// where the text ends.
+/// One line of text (ASCII), centred in the height of `box`, `share` of the room left over before
+/// it; shrinks until it fits. Returns where the text ends.
 int put_caption(cv::Mat& image,
                 const cv::Rect& box,
                 const std::string& text,
                 const cv::Scalar& color,
                 double share = 0.0);
 
-/// An RGB image as a JPEG for a page: its bytes, made at most `width` pixels wide.
+/// The bytes of a JPEG at most `width` pixels wide.
 [[nodiscard]] std::string encode_jpeg(const cv::Mat& image, int width);
 
-/// Writes an RGB or gray image as PNG. Error: the file cannot be written.
 [[nodiscard]] Status write_image(const std::filesystem::path& file, const cv::Mat& image);
 
 /// Top view of a drive: x to the right, z (forward) up, equal axes. Poses are drawn as they

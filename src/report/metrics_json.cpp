@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "report/metrics_json.hpp"
 
-#include <utility>
-
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -12,7 +10,6 @@
 #include "try.hpp"
 
 namespace stemvo {
-
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -218,10 +215,6 @@ Json metrics_document(const MetricsReport& report) {
     json["timing"] = *report.timing;
   }
   return json;
-}
-
-Status write_metrics_json(const std::filesystem::path& file, const MetricsReport& report) {
-  return write_text_file(file, to_text(metrics_document(report)));
 }
 
 std::array<std::string, 10> metric_texts(const Metrics& metrics) {

@@ -27,7 +27,6 @@ struct nlohmann::adl_serializer<std::optional<T>> {
 
 namespace stemvo {
 
-/// The camera as it was known in the end.
 struct CameraReport {
   Camera camera;
   std::optional<CameraSigma> sigma;  ///< nullopt: it is not refined
@@ -75,12 +74,7 @@ inline constexpr double kFewBelieved = 0.5;
 /// The warning about a road that was believed never or on few frames; empty where all is well.
 [[nodiscard]] std::string warn_of_road(const MetricsReport& report);
 
-/// Keys: those of metrics_document(); `alignment` is that of the offset, t_rel, r_rel and the RPE.
-/// Numbers round-trip; one that is not finite becomes null. Error: the file cannot be written.
-[[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,
-                                        const MetricsReport& report);
-
-/// The document that metrics.json holds.
+/// The document that metrics.json holds; `alignment` is that of the offset, t_rel, r_rel, the RPE.
 [[nodiscard]] nlohmann::ordered_json metrics_document(const MetricsReport& report);
 
 /// Adds the keys of metrics.json that need ground truth; all null without metrics.
@@ -93,14 +87,11 @@ void add_metrics(nlohmann::ordered_json& json, const std::optional<Metrics>& met
 /// Errors: the file cannot be read, is no JSON or holds no object.
 [[nodiscard]] Expected<nlohmann::ordered_json> read_json_object(const std::filesystem::path& file);
 
-/// The same numbers as an aligned table; each row names its alignment, the zero-motion baseline
-/// stands beside the offset. Ends with a newline.
 [[nodiscard]] std::string format_metrics_table(const MetricsReport& report);
 /// Numbers for people: t_rel, r_rel, offset, that of zero motion, the ATE after each alignment in
 /// its order from kAteText on, RPE of position and of rotation.
 [[nodiscard]] std::array<std::string, 10> metric_texts(const Metrics& metrics);
 inline constexpr std::size_t kAteText = 4;
-/// The stages as an aligned table, then what concerns the whole run. Ends with a newline.
 [[nodiscard]] std::string format_timing_table(const TimingReport& report);
 
 }  // namespace stemvo

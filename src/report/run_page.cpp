@@ -4,10 +4,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "evaluation/trajectory.hpp"
-#include "report/frame_image.hpp"
-#include "report/metrics_json.hpp"
-
 namespace stemvo {
 namespace {
 
@@ -15,13 +11,12 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kFirstFrameStep = 10;  // the devkit's
 
-/// KITTI's segments: lists of their lengths and errors.
 Json segments_json(const RunPage& run) {
   const auto& [truth, frames] = *run.ground_truth;
   Json lists = {
       {"length_m", Json::array()}, {"t_percent", Json::array()}, {"r_deg_per_100m", Json::array()}};
   for (const SegmentError& error :
-       segment_errors(take_poses(run.estimate, frames), truth,
+       segment_errors(take_poses(run.plot.estimate, frames), truth,
                       run.report.metrics->segment_lengths_m, kFirstFrameStep)) {
     lists["length_m"].push_back(error.length_m);
     lists["t_percent"].push_back(error.t_percent);
@@ -51,14 +46,14 @@ void SmallFrames::add(std::size_t row, std::size_t number, const cv::Mat& image)
 
 Status write_run_page(const std::filesystem::path& file, const RunPage& run) {
   Json content = {{"page", "run"},
-                  {"title", run.title},
-                  {"subtitle", run.subtitle},
-                  {"unit", run.unit},
+                  {"title", run.plot.title},
+                  {"subtitle", run.plot.subtitle},
+                  {"unit", run.plot.unit},
                   {"frames_csv", run.frames_csv},
                   {"metrics", metrics_document(run.report)},
                   {"numbers", format_metrics_table(run.report)},
                   {"stages", run.report.timing ? format_timing_table(*run.report.timing) : ""},
-                  {"estimate", html::path_json(run.estimate)},
+                  {"estimate", html::path_json(run.plot.estimate)},
                   {"map", Json()},
                   {"truth", Json()},
                   {"images", html::images_json(run.images)},

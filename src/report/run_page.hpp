@@ -13,6 +13,7 @@
 #include "dataset/frame_source.hpp"
 #include "evaluation/trajectory.hpp"
 #include "html/page.hpp"
+#include "report/frame_image.hpp"
 #include "report/metrics_json.hpp"
 #include "stemvo/error.hpp"
 
@@ -24,8 +25,7 @@ class SmallFrames {
  public:
   explicit SmallFrames(std::size_t max_bytes = 3'500'000) : max_bytes_(max_bytes) {}
 
-  /// `row`: the frame's, in frames.csv; rows rise. The image is gray or RGB; an empty one is left
-  /// out. `number`: the frame's in its recording.
+  /// `row`: in frames.csv, rising; `number`: in the recording. An empty image is left out.
   void add(std::size_t row, std::size_t number, const cv::Mat& image);
   [[nodiscard]] const std::vector<html::CaptionedImage>& images() const { return images_; }
 
@@ -36,21 +36,16 @@ class SmallFrames {
   std::vector<html::CaptionedImage> images_;
 };
 
-/// The map of a run.
 struct MapPage {
   Trajectory path;  ///< of all frames, aligned as the estimate
   std::vector<std::pair<std::size_t, std::size_t>> loops;  ///< frames that show one place
 };
 
-/// The content of a run's report.html: a row and a pose per frame, in the world of the ground
-/// truth, which some frames may lack.
+/// A row and a pose per frame, in the world of the ground truth, which some frames may lack.
 struct RunPage {
-  std::string title;
-  std::string subtitle;
-  std::string unit = "m";  ///< in which the trajectories are
+  const TrajectoryPlot& plot;  ///< its estimate after the alignment of report.metrics
   const MetricsReport& report;
   const std::string& frames_csv;
-  const Trajectory& estimate;         ///< after the alignment of report.metrics
   const std::optional<MapPage>& map;  ///< nullopt: nothing is remembered
   const std::optional<GroundTruth>& ground_truth;
   const std::vector<html::CaptionedImage>& images;
@@ -59,9 +54,6 @@ struct RunPage {
   std::string command;                                    ///< that repeats the run; may be empty
 };
 
-/// Path from above with a slider over the frames, numbers, the path in 3D, errors over distance and
-/// by segment length (with ground truth), tracks, states and R_H, scale and camera with their
-/// sigma, time per stage, images, configuration. Error: the file cannot be written.
 [[nodiscard]] Status write_run_page(const std::filesystem::path& file, const RunPage& run);
 
 }  // namespace stemvo

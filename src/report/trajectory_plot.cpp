@@ -135,22 +135,20 @@ void draw_marker(bool is_start, const cv::Point& at, cv::Mat& image) {
 void draw_legend(bool has_truth, cv::Mat& image) {
   constexpr int kY_px = kTop_px - kLine_px / 2;
   int x = kLeft_px;
-  const auto add = [&](const char* name, int sample_px, const auto& draw_sample) {
-    draw_sample(x);
+  const auto name_sample = [&](const char* name, int sample_px) {
     x = put_caption(image, {x + sample_px, kTop_px - kLine_px, 400, kLine_px}, name, kPlotInk) + 40;
   };
-  const auto line_of = [&](const cv::Scalar& color, int width_px) {
-    return [&image, color, width_px](int at) {
-      cv::line(image, {at, kY_px}, {at + 54, kY_px}, color, width_px, cv::LINE_AA);
-    };
+  const auto add_line = [&](const char* name, const cv::Scalar& color, int width_px) {
+    cv::line(image, {x, kY_px}, {x + 54, kY_px}, color, width_px, cv::LINE_AA);
+    name_sample(name, 70);
   };
   if (has_truth) {
-    add("ground truth", 70, line_of(kTruth, kTruthWidth_px));
+    add_line("ground truth", kTruth, kTruthWidth_px);
   }
-  add("estimate", 70, line_of(kEstimate, kEstimateWidth_px));
+  add_line("estimate", kEstimate, kEstimateWidth_px);
   for (const bool is_start : {true, false}) {
-    add(is_start ? "start" : "end", 32,
-        [&](int at) { draw_marker(is_start, {at + kMarker_px, kY_px}, image); });
+    draw_marker(is_start, {x + kMarker_px, kY_px}, image);
+    name_sample(is_start ? "start" : "end", 32);
   }
 }
 

@@ -214,7 +214,6 @@ void add_shelves(const Stand& stand, const Room& room, Draw draw) {
 
 constexpr std::array kThings = {add_brick_pillar, add_crates, add_planter, add_shelves};
 
-/// A way of building part of a wall.
 struct WallKind {
   double min_height_m;
   double max_height_m;
@@ -227,7 +226,6 @@ constexpr std::array<WallKind, 5> kWallKinds = {{{6.0, 6.6, nullptr},
                                                  {2.3, 3.2, hedge_style},
                                                  {2.8, 3.8, board_style}}};
 
-/// 0 to N - 1 in a random order.
 template <std::size_t N>
 std::array<std::size_t, N> shuffled(Draw& draw) {
   std::array<std::size_t, N> order{};
@@ -277,7 +275,6 @@ void add_wall(const Stand& stand, double length_m, Draw draw) {
   }
 }
 
-/// A wall of one colour.
 void add_blank_wall(const Stand& stand, double length_m, Draw draw) {
   const float light = draw.in_float(0.45, 0.62);
   stand.moved(0.0, -kWallDepth_m, 0.0)
@@ -285,7 +282,6 @@ void add_blank_wall(const Stand& stand, double length_m, Draw draw) {
                  {.albedo = {light, 0.97F * light, 0.9F * light}});
 }
 
-/// Things that stand before the wall, with gaps.
 void add_things_at_wall(const Stand& stand, double length_m, Draw draw) {
   constexpr double kMaxDepth_m = 0.45;
   double x = kMaxRelief_m + draw.in(0.1, 0.8);
@@ -300,7 +296,6 @@ void add_things_at_wall(const Stand& stand, double length_m, Draw draw) {
   }
 }
 
-/// Crowns that look over the wall.
 void add_trees_behind(const Stand& stand, double length_m, Draw draw) {
   for (double x = draw.in(0.5, 2.5); x < length_m; x += draw.in(3.0, 5.0)) {
     const Draw leaves(draw.bits(), 'c');
@@ -311,7 +306,6 @@ void add_trees_behind(const Stand& stand, double length_m, Draw draw) {
   }
 }
 
-/// One of each kind between the walkways.
 void add_things_between(const Courtyard& yard, Scene& scene) {
   Draw draw(yard.seed, 'I');
   const auto kinds = shuffled<kThings.size()>(draw);
@@ -325,7 +319,6 @@ void add_things_between(const Courtyard& yard, Scene& scene) {
   }
 }
 
-/// Large slabs, a border of small stones along the walls.
 void add_floor(
     double left, double near, double right, double far, std::uint64_t seed, Scene& scene) {
   constexpr double kBorder_m = 1.1;

@@ -6,7 +6,6 @@
 #include <numeric>
 
 namespace stemvo::synth {
-
 namespace {
 
 /// Smallest value within `reach` knots, then the mean over the same reach: smooth and never above
@@ -123,7 +122,6 @@ std::vector<double> plan_speed(const std::vector<double>& curvature) {
   return smooth(speed, 10);
 }
 
-/// Stops, stands and goes on.
 class Driver {
  public:
   Driver(const std::vector<double>& curvature, std::uint64_t seed)
@@ -174,7 +172,6 @@ class Driver {
   double stand_s_ = 0.0;
 };
 
-/// How the camera moves against the road.
 struct CarBody {
   std::uint64_t seed;
   Sway pitch_rad{seed, 1, radians(0.38), 0.12, 1.7};

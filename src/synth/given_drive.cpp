@@ -15,7 +15,6 @@ constexpr double kFine_m = 0.25;        // spacing while smoothing
 Vec3 forward_of(const Rigid3& pose) { return pose.rotation_matrix().col(2); }
 Vec3 up_of(const Rigid3& pose) { return -pose.rotation_matrix().col(1); }
 
-/// The cameras that moved the path on.
 Trajectory choose_keys(const Trajectory& poses) {
   constexpr double kMinAdvance_m = 0.3;  // less is standing, turning on the spot, or reversing
   Trajectory keys = {poses.front()};
@@ -65,7 +64,6 @@ Path resample(const Path& from, double spacing_m) {
   return to;
 }
 
-/// The keys, prolonged straight on both sides.
 Path prolong(const Trajectory& keys) {
   const std::size_t last = keys.size() - 1;
   const std::size_t reach = std::min<std::size_t>(4, last);
@@ -122,7 +120,6 @@ std::vector<double> arcs_along(const RoadCurve& road, const Trajectory& world_fr
   return arcs_m;
 }
 
-/// Moves each camera up by the lift of the knot that it is at.
 void lift(const std::vector<double>& lifts_m, Drive& drive) {
   const std::vector<double> arcs_m = arcs_along(drive.road, drive.world_from_camera);
   for (std::size_t i = 0; i < arcs_m.size(); ++i) {
@@ -161,7 +158,6 @@ Vec3 on_line(const RoadFrame& home, const Vec3& point) {
   return home.position + home.forward.dot(point - home.position) * home.forward;
 }
 
-/// Builds the joined road knot by knot.
 class Joiner {
  public:
   Joiner(const RoadCurve& road, const std::vector<int>& homes)

@@ -80,7 +80,6 @@ struct Sample {
   [[nodiscard]] float bars_v(float period, float bar) const {
     return bars_coverage(v, width_v, period, bar);
   }
-  /// Share of the footprint in a rectangle.
   [[nodiscard]] float area(float left, float right, float low, float high) const {
     return box_coverage(u, width_u, left, right) * box_coverage(v, width_v, low, high);
   }

@@ -7,7 +7,6 @@
 #include "synth/materials.hpp"
 
 namespace stemvo::synth {
-
 namespace {
 
 /// A box in a thing's own axes: along, to the right, up from the middle of its rear end; metres.
@@ -42,7 +41,6 @@ void add_parts(const RoadFrame& axes,
   }
 }
 
-/// A thin dark mat.
 Part shadow(double length_m, double width_m) {
   return {kShadow, {-0.1, -0.1 - 0.5 * width_m, 0.0}, {length_m + 0.2, width_m + 0.2, 0.015}};
 }

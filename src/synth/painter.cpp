@@ -150,14 +150,12 @@ std::pair<double, double> crossings(const ScreenFace& face, double y) {
   return {left, right};
 }
 
-/// First whole number at or above `value`, within [0, end].
 int first_from(double value, int end) {
   return static_cast<int>(std::ceil(std::clamp(value, 0.0, static_cast<double>(end))));
 }
 
 cv::Vec3f to_vector(const Rgb& colour) { return {colour[0], colour[1], colour[2]}; }
 
-/// One frame while it is drawn, by bands of rows.
 struct FramePainter {
   const Camera& camera;
   const Textures& textures;

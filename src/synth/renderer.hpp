@@ -49,7 +49,6 @@ class Renderer {
   [[nodiscard]] RenderedFrame render(std::size_t index) const;
 
  private:
-  /// The scene that stands still around a frame.
   [[nodiscard]] Scene still_scene(std::size_t index) const;
   /// Light on the chip, before the sensor.
   [[nodiscard]] RenderedFrame light_of(std::size_t index) const;

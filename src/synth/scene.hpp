@@ -14,7 +14,6 @@ struct Sample;
 /// Mean colour over a footprint, before light and haze.
 using Material = Rgb (*)(const Sample& at);
 
-/// How a face is painted.
 struct Style {
   Material material = nullptr;  ///< nullptr: cars, poles, signs: one colour
   std::uint32_t seed = 0;

@@ -11,7 +11,6 @@ namespace stemvo::synth {
 /// darker, noise of about 1.8 gray levels per channel, 8 bits. CV_8UC3, RGB.
 [[nodiscard]] cv::Mat expose(const cv::Mat& light, float exposure, std::uint64_t seed);
 
-/// A small camera's chip.
 namespace chip {
 inline constexpr double kFill = 0.8;         ///< side of a pixel's sensitive square, in pixels
 inline constexpr double kSpread_px = 0.6;    ///< deviation of the lens' point spread

@@ -9,7 +9,6 @@
 namespace stemvo::synth {
 namespace {
 
-/// Builders of things along the road need this.
 struct Street {
   const RoadCurve& road;
   double camera_m;   ///< arc length
@@ -41,7 +40,6 @@ struct Street {
     });
   }
   [[nodiscard]] bool is_crossed(int knot) const { return is_crossed(home(knot), home(knot) + 1); }
-  /// The knot of the first visit.
   [[nodiscard]] int home(int knot) const { return knot - part_of(knot).shift; }
   /// Coordinates of the road's texture, near 0 around the camera.
   [[nodiscard]] double u_m(int knot) const {
@@ -92,7 +90,6 @@ int last_clear_knot(const RoadCurve& road, int from, int start, int step, double
   return end;
 }
 
-/// A corner of a face between two knots of the road.
 struct Corner {
   int knot;  ///< 0 or 1
   double lateral_m;

@@ -97,7 +97,6 @@ std::string encode_npy(const cv::Mat& values) {
   return bytes;
 }
 
-/// Frames [begin, end), at once.
 Status render_frames(const synth::Renderer& renderer,
                      const fs::path& sequence,
                      cv::Range frames,
@@ -169,10 +168,7 @@ Status render_synthetic_drive(const fs::path& out_dir,
   int done = 0;
   for (bool go_on = true; go_on && done < total;) {
     const cv::Range frames(done, std::min(done + batch, total));
-    const Status status = render_frames(renderer, drive.sequence, frames, options);
-    if (!status) {
-      return status;
-    }
+    STEMVO_TRY(render_frames(renderer, drive.sequence, frames, options));
     done = frames.end;
     go_on = !progress || progress(static_cast<std::size_t>(done), poses.size());
   }

@@ -15,7 +15,6 @@ constexpr double kSeenBehind_m = 25.0;
 constexpr double kSeenAhead_m = 170.0;
 constexpr double kMoving_m_s = 0.02;
 
-/// Metres along the road of each camera.
 std::vector<double> exact_arcs(const Drive& drive) {
   std::vector<double> arcs_m;
   for (std::size_t i = 0; i < drive.arcs_m.size(); ++i) {
@@ -26,7 +25,6 @@ std::vector<double> exact_arcs(const Drive& drive) {
   return arcs_m;
 }
 
-/// Mean over a second and a half.
 std::vector<double> calm(const std::vector<double>& arcs_m) {
   constexpr std::ptrdiff_t kReach = 7;
   std::vector<double> result;
@@ -46,7 +44,6 @@ RoadFrame turned_back(RoadFrame place) {
   return place;
 }
 
-/// The camera stands.
 struct Stand {
   double begin_s;
   double end_s;

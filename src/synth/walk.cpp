@@ -60,7 +60,6 @@ struct Phase {
   }
 };
 
-/// The camera turns aside and back while the person walks on.
 struct Glance {
   double begin_s;
   double turn_s;  ///< each way
@@ -118,7 +117,6 @@ class WalkPlan {
     return heading_rad_ + std::remainder(std::atan2(way.x(), way.y()) - heading_rad_, 2.0 * kPi);
   }
 
-  /// The person stands for a while, from now on.
   [[nodiscard]] Phase stand(double duration_s) const {
     return {now_s_, duration_s, at_m_, at_m_, heading_rad_, heading_rad_, 0.0, 0.0};
   }
@@ -237,7 +235,6 @@ double cruising_speed_m_s(const Courtyard& courtyard,
   return cruise_m_s;
 }
 
-/// How the person stands at one moment.
 struct Stance {
   Vec2 axis_m;  ///< x, z
   double heading_rad;
@@ -268,7 +265,6 @@ Stance stance_at(const WalkPlan& plan, double time_s) {
   return stance;
 }
 
-/// How the hand holds the camera while the person walks.
 struct Hand {
   std::uint64_t seed;
   Sway yaw_rad{seed, 101, radians(2.5), 0.04, 0.35};

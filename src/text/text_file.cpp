@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <fstream>
 #include <system_error>
-#include <utility>
 
 #include <fmt/core.h>
 
@@ -164,12 +163,8 @@ void add_line(std::vector<std::string>& lines, std::string line) {
   }
 }
 
-std::string at_line(const fs::path& file, std::size_t line) {
-  return fmt::format("{}:{}", file.string(), line);
-}
-
 Error fail_at(const fs::path& file, std::size_t index, const Error& error) {
-  return fail(fmt::format("{}: {}", at_line(file, index + 1), error.message));
+  return fail(fmt::format("{}:{}: {}", file.string(), index + 1, error.message));
 }
 
 namespace {
@@ -183,7 +178,6 @@ constexpr Unit kUnits[] = {{1.0, "seconds"},
                            {1e-6, "microseconds"},
                            {kNanosecond_s, "nanoseconds"}};
 
-/// 0: one row.
 double usual_step(const std::vector<TimedRow>& rows) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < rows.size(); ++i) {

@@ -19,7 +19,7 @@ inline constexpr int kMaxSettings_MB = 1;
 inline constexpr int kMaxFile_MB = 256;
 inline constexpr double kNanosecond_s = 1e-9;
 
-/// Names what lies there, for messages: "a file", "a folder", "nothing of that name", ..
+/// "a file", "a folder", "nothing of that name", ..
 [[nodiscard]] std::string_view kind_of(const std::filesystem::path& path);
 
 /// The whole file as it is. Errors: missing, no regular file, unreadable, larger.
@@ -44,15 +44,12 @@ inline constexpr double kNanosecond_s = 1e-9;
 [[nodiscard]] std::vector<std::string_view> split_lines(std::string_view text);
 /// The next word between blanks and tabs, which the line loses; empty: there is none.
 [[nodiscard]] std::string_view take_word(std::string_view& line);
-/// The words between blanks and tabs.
 [[nodiscard]] std::vector<std::string_view> split_words(std::string_view line);
 
 /// Shortens a text from elsewhere to what a message may hold: one line of at most 300 bytes.
 [[nodiscard]] std::string one_line(std::string_view text);
 /// Adds a line, unless it is empty.
 void add_line(std::vector<std::string>& lines, std::string line);
-/// "file:line", line counted from 1, for messages.
-[[nodiscard]] std::string at_line(const std::filesystem::path& file, std::size_t line);
 /// The error with file and line in front; `index` counts lines from 0.
 [[nodiscard]] Error fail_at(const std::filesystem::path& file,
                             std::size_t index,

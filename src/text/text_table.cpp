@@ -3,14 +3,12 @@
 
 #include <algorithm>
 #include <iomanip>
-#include <sstream>
 
 #include <fmt/format.h>
 
 #include "internal_check.hpp"
 
 namespace stemvo {
-
 namespace {
 
 /// Characters shown, not bytes: continuation bytes of UTF-8 take no room.

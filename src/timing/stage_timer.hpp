@@ -35,7 +35,6 @@ enum class Stage {
 };
 inline constexpr int kNumStages = static_cast<int>(Stage::kResultFiles) + 1;
 
-/// One row of `stemvo run --timing`.
 struct StageTiming {
   std::string name;
   std::size_t calls = 0;
@@ -44,8 +43,6 @@ struct StageTiming {
   double cpu_s = 0.0;      ///< of the calling thread, all calls
 };
 
-/// Where a run's time went. A stage's processor time is that of the thread that called it: what
-/// OpenCV gave to other threads is in `rest_cpu_s`.
 struct TimingReport {
   std::vector<StageTiming> stages;  ///< in the order a frame meets them; those never called: not
   double rest_cpu_s = 0.0;          ///< start of the program, no stage, OpenCV's other threads
@@ -56,7 +53,7 @@ struct TimingReport {
   double peak_memory_mib = 0.0;  ///< most the program has held at once; NaN: not told
 };
 
-/// Collects what StageTimers measure, in any thread, while it lives. One at a time (checked).
+/// Collects what StageTimers measure, in any thread. One at a time (checked).
 class StageRecorder {
  public:
   StageRecorder();
@@ -68,7 +65,6 @@ class StageRecorder {
   [[nodiscard]] static StageRecorder* active() { return active_.load(std::memory_order_acquire); }
 
   void add(Stage stage, double wall_ms, double cpu_ms);
-  /// Processor time of all calls of a stage so far.
   [[nodiscard]] double cpu_ms(Stage stage) const;
   /// Covers everything so far; `fps`, `num_frames` and `num_threads` are the caller's to fill in.
   [[nodiscard]] TimingReport report() const;
@@ -85,8 +81,8 @@ class StageRecorder {
   std::vector<Samples> stages_;
 };
 
-/// Measures a stage from here to the end of the block; without a StageRecorder it does nothing. It
-/// sees the calling thread only, not what OpenCV hands to other threads.
+/// Measures a stage from here to the end of the block, in the calling thread only; without a
+/// StageRecorder it does nothing.
 class StageTimer {
  public:
   explicit StageTimer(Stage stage);
@@ -101,7 +97,6 @@ class StageTimer {
   double cpu_ms_ = 0.0;
 };
 
-/// Measures `work` and returns what it returns.
 template <typename Work>
 decltype(auto) timed(Stage stage, Work&& work) {
   const StageTimer timer(stage);

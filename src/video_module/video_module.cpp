@@ -11,7 +11,6 @@
 #include "dataset/video_decoder.hpp"
 
 namespace stemvo::dataset {
-
 namespace {
 
 VideoDecoder decoder_of(cv::VideoCapture capture, int turned_deg) {  // copies share the video

@@ -3,8 +3,7 @@
 
 #include "evaluation/trajectory.hpp"
 #include "pipeline/run.hpp"
-#include "report/frames_csv.hpp"
-#include "report/map_ply.hpp"
+#include "report/data_files.hpp"
 #include "support/ply_reader.hpp"
 #include "support/report_content.hpp"
 #include "support/state_runs.hpp"

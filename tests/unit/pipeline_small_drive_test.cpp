@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "evaluation/trajectory.hpp"
-#include "pipeline/channel_images.hpp"
 #include "pipeline/run.hpp"
 #include "support/small_drive.hpp"
 #include "support/test.hpp"

@@ -2,7 +2,7 @@
 #include <clocale>
 #include <locale>
 
-#include "report/frames_csv.hpp"
+#include "report/data_files.hpp"
 #include "support/run_program.hpp"
 #include "support/test.hpp"
 

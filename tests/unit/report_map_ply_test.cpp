@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "report/map_ply.hpp"
+#include "report/data_files.hpp"
 #include "support/ply_reader.hpp"
 #include "support/test.hpp"
 

@@ -3,6 +3,7 @@
 
 #include "report/metrics_json.hpp"
 #include "support/test.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
@@ -42,7 +43,7 @@ MetricsReport example() {
 
 nlohmann::json written(const MetricsReport& report) {
   const TempFolder folder;
-  const Status status = write_metrics_json(folder / "metrics.json", report);
+  const Status status = write_text_file(folder / "metrics.json", to_text(metrics_document(report)));
   EXPECT_TRUE(status) << status.error().message;
   const std::string text = read_all(folder / "metrics.json");
   EXPECT_TRUE(text.ends_with("}\n"));
@@ -122,8 +123,9 @@ TEST(MetricsJson, SurvivesNamesThatAreNotUtf8AndFoldersThatAreNotThere) {
   MetricsReport report = example();
   report.sequence = "\xff\"quoted\"";
   EXPECT_THAT(written(report)["sequence"].get<std::string>(), HasSubstr("\"quoted\""));
-  EXPECT_THAT(message_of(write_metrics_json("/nonexistent/metrics.json", report)),
-              HasSubstr("/nonexistent/metrics.json: cannot write"));
+  EXPECT_THAT(
+      message_of(write_text_file("/nonexistent/metrics.json", to_text(metrics_document(report)))),
+      HasSubstr("/nonexistent/metrics.json: cannot write"));
 }
 
 TEST(MetricsTable, SaysWhereARoadWasBelievedNeverOrSeldom) {

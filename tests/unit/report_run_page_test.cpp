@@ -31,18 +31,10 @@ class RunPageTest : public ::testing::Test {
 
   json content() {
     const std::string csv = "frame,state\n100,first\n";
-    EXPECT_TRUE(write_run_page(folder_ / "report.html", {"a drive",
-                                                         "numbers",
-                                                         "m",
-                                                         report_,
-                                                         csv,
-                                                         estimate_,
-                                                         map_,
-                                                         truth_,
-                                                         {},
-                                                         small_frames_,
-                                                         "key: value",
-                                                         "stemvo run"}));
+    const TrajectoryPlot plot{"a drive", "numbers", estimate_, std::nullopt, "m"};
+    EXPECT_TRUE(write_run_page(
+        folder_ / "report.html",
+        {plot, report_, csv, map_, truth_, {}, small_frames_, "key: value", "stemvo run"}));
     return report_content(read_text_file(folder_ / "report.html").value_or(""));
   }
 

@@ -1,16 +1,23 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include <Eigen/Core>
+
+#include "evaluation/trajectory.hpp"
+#include "stemvo/error.hpp"
 #include "stemvo/odometry.hpp"
 
 namespace stemvo {
 
-/// The header of frames.csv, with its newline: docs/results.md says what each column holds.
+/// With its newline: docs/results.md says what each column holds.
 [[nodiscard]] std::string_view frames_csv_header();
 /// A row with its newline; the frame in the folder's numbering, the pose as result files hold it.
 /// The columns of its error are empty.
@@ -28,5 +35,18 @@ struct FrameError {
 /// The table with errors of some rows, in their order.
 [[nodiscard]] std::string frames_csv_with_errors(std::string_view table,
                                                  std::span<const FrameError> errors);
+
+struct ColoredPoint {
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();
+  std::array<std::uint8_t, 3> rgb{};
+};
+
+inline constexpr std::array<std::uint8_t, 3> kMapPathColor{255, 64, 0};
+
+/// A map as binary PLY: `vertex` with the points that are finite, then the camera positions, and
+/// `edge` from each camera position to the next. Error: it cannot be written.
+[[nodiscard]] Status write_map_ply(const std::filesystem::path& file,
+                                   std::span<const ColoredPoint> points,
+                                   std::span<const Rigid3> world_from_camera);
 
 }  // namespace stemvo
