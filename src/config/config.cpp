@@ -18,7 +18,6 @@ constexpr std::string_view kScaleSource = "scale.source";
 constexpr std::string_view kAuto = "auto";
 constexpr std::string_view kGroundTruth = "ground_truth";
 
-/// The keys of the program, then those of the library.
 template <options::Is<Config> C, typename V>
 void visit_keys(C& config, V&& v) {
   v("input", "camera", config.input.camera,

@@ -73,7 +73,6 @@ std::string like_name(const std::string& name, const std::vector<Key>& keys) {
   return nearest;
 }
 
-/// "unknown key; known keys of stem: model, filter, ...; did you mean stem.filter?"
 std::string unknown_key(std::string_view section,
                         const std::string& key,
                         const std::vector<Key>& keys) {

@@ -33,7 +33,6 @@ struct CameraFile {
 /// COLMAP's cameras.txt of one camera.
 [[nodiscard]] Expected<CameraFile> read_colmap_camera(const std::filesystem::path& file);
 
-/// Our form of it.
 [[nodiscard]] std::string camera_file_text(const CameraFile& file);
 
 }  // namespace stemvo::dataset

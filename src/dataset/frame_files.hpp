@@ -64,9 +64,7 @@ namespace stemvo::dataset {
 [[nodiscard]] std::string without_secrets(const std::string& text);
 /// N of "camera:N".
 [[nodiscard]] std::optional<int> camera_number(const std::filesystem::path& path);
-/// A video file, an address, or a live camera.
 [[nodiscard]] Expected<FrameSource> open_video(const FrameSourceRequest& request);
-/// The same of a stream that is open.
 [[nodiscard]] Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                                 const CameraFile& camera,
                                                 const FrameSourceRequest& request);

@@ -39,7 +39,6 @@ struct ImageKind {
                                            bool as_color,
                                            const WantedSize& wanted = {},
                                            const Levels& levels = {});
-/// Size and colours of an image that read_image takes.
 [[nodiscard]] Expected<ImageKind> read_image_kind(const std::filesystem::path& file);
 
 /// 8-bit image, gray or RGB -> the bytes of a JPEG file (baseline, colours at half the size).

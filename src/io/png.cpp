@@ -88,7 +88,6 @@ bool collect_pixel_data(Bytes rest, std::vector<std::uint8_t>& packed) {
   return false;
 }
 
-/// One row: the filtered bytes, the row above, and where the row goes.
 struct Row {
   const std::uint8_t* filtered;
   const std::uint8_t* above;
@@ -166,7 +165,6 @@ cv::Mat undo_filters(const std::vector<std::uint8_t>& filtered, int rows, int co
   return image;
 }
 
-/// Kept from frame to frame.
 struct Workspace {
   std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> decompressor{
       libdeflate_alloc_decompressor(), &libdeflate_free_decompressor};

@@ -111,7 +111,6 @@ template <typename T, typename Struct>
 concept Is = std::derived_from<std::remove_const_t<T>, Struct>;
 
 inline const Rule kAny;
-/// Lengths in pixels that must not be zero.
 inline const Rule kPixels = Rule::between(1e-3, 1000);
 
 template <Is<StemOptions> O, typename V>

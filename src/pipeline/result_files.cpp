@@ -231,7 +231,6 @@ class ResultWriter {
            });
   }
 
-  /// All frames, in the world of the ground truth where some have one.
   [[nodiscard]] TrajectoryPlot make_plot(const MetricsReport& report) const {
     TrajectoryPlot plot;
     plot.title = describe_frames(sequence_, trajectory_.size());
@@ -249,7 +248,6 @@ class ResultWriter {
     return plot;
   }
 
-  /// The poses where the ground truth, if there is one, has them.
   [[nodiscard]] Trajectory in_truth(const Trajectory& poses, const MetricsReport& report) const {
     return truth_
                ? align_trajectory(poses, truth_->frames, truth_->poses, report.metrics->alignment)

@@ -104,7 +104,6 @@ struct MapResult {
 /// scale.source=ground_truth steps get their true length.
 [[nodiscard]] MapResult finish_map(const Run& run);
 
-/// Pairs of frames of this run that show one place.
 [[nodiscard]] std::vector<std::pair<std::size_t, std::size_t>> loops_of(const KeptMap& map);
 
 /// map.ply: landmarks and the camera's path among them. Where steps are rescaled, both are.

@@ -26,7 +26,6 @@ namespace stemvo {
                                          const FrameResult& result,
                                          const Rigid3& written);
 
-/// A frame's error that the alignment of all leaves.
 struct FrameError {
   std::size_t row = 0;  ///< counted from 0
   double position_m = 0.0;

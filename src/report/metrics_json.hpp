@@ -32,7 +32,6 @@ struct CameraReport {
   std::optional<CameraSigma> sigma;  ///< nullopt: it is not refined
 };
 
-/// The map of a run. The keys of `metrics` are those of MetricsReport's.
 struct MapReport {
   std::size_t num_keyframes = 0;
   std::size_t num_loops = 0;            ///< places seen again while the camera was tracked
@@ -69,7 +68,6 @@ struct MetricsReport {
   }
 };
 
-/// Frames in metres are fewer than this share: a warning.
 inline constexpr double kFewBelieved = 0.5;
 /// The warning about a road that was believed never or on few frames; empty where all is well.
 [[nodiscard]] std::string warn_of_road(const MetricsReport& report);

@@ -131,7 +131,6 @@ void draw_marker(bool is_start, const cv::Point& at, cv::Mat& image) {
   }
 }
 
-/// One line above the plot, where it can hide no data.
 void draw_legend(bool has_truth, cv::Mat& image) {
   constexpr int kY_px = kTop_px - kLine_px / 2;
   int x = kLeft_px;

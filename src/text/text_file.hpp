@@ -37,7 +37,6 @@ inline constexpr double kNanosecond_s = 1e-9;
 /// Removes the file, if there is one, and what a killed write_text_file left of it.
 [[nodiscard]] Status remove_file(const std::filesystem::path& file);
 
-/// The file as lines without their ends.
 [[nodiscard]] Expected<std::vector<std::string>> read_lines(const std::filesystem::path& file,
                                                             int max_MB = kMaxFile_MB);
 /// Lines without their end (`\n` or `\r\n`); no empty line is added for the last newline.
@@ -50,12 +49,10 @@ inline constexpr double kNanosecond_s = 1e-9;
 [[nodiscard]] std::string one_line(std::string_view text);
 /// Adds a line, unless it is empty.
 void add_line(std::vector<std::string>& lines, std::string line);
-/// The error with file and line in front; `index` counts lines from 0.
 [[nodiscard]] Error fail_at(const std::filesystem::path& file,
                             std::size_t index,
                             const Error& error);
 
-/// A row of a file that begins with its time.
 struct TimedRow {
   double time_s = 0.0;
   std::string rest;      ///< words between blanks

@@ -15,7 +15,6 @@ class TextTable {
 
   /// At most as many cells as columns (checked).
   void add(std::vector<std::string> cells);
-  /// A line under the last row.
   void rule() { rows_.emplace_back(); }
   [[nodiscard]] std::string str() const;
 

@@ -61,7 +61,6 @@ class StageRecorder {
   StageRecorder(const StageRecorder&) = delete;
   StageRecorder& operator=(const StageRecorder&) = delete;
 
-  /// The living one, or null.
   [[nodiscard]] static StageRecorder* active() { return active_.load(std::memory_order_acquire); }
 
   void add(Stage stage, double wall_ms, double cpu_ms);
