@@ -137,18 +137,21 @@ Expected<Trajectory> trajectory_of(const AnyArray& array, const std::string& nam
   Trajectory poses;
   const auto* const data = static_cast<const double*>(array.data());
   for (std::size_t i = 0; i < array.shape(0); ++i) {
-    Matrix34d matrix;
-    for (int row = 0; row < 3; ++row) {
+    Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+    for (int row = 0; row < static_cast<int>(array.shape(1)); ++row) {
       for (int column = 0; column < 4; ++column) {
         matrix(row, column) = data[static_cast<std::int64_t>(i) * array.stride(0) +
                                    row * array.stride(1) + column * array.stride(2)];
       }
     }
-    if (!matrix.allFinite() || !is_rotation(matrix.leftCols<3>())) {
-      return fail(
-          fmt::format("{}[{}]: expected a rotation and a finite translation, found none", name, i));
+    if (!matrix.allFinite() || !is_rotation(matrix.topLeftCorner<3, 3>()) ||
+        matrix.row(3) != Eigen::RowVector4d::UnitW()) {
+      return fail(fmt::format(
+          "{}[{}]: expected a rotation, a finite translation beside it and 0, 0, 0, 1 below, found "
+          "other numbers",
+          name, i));
     }
-    poses.push_back(Rigid3::from_matrix(matrix));
+    poses.push_back(Rigid3::from_matrix(matrix.topRows<3>()));
   }
   return poses;
 }

@@ -125,6 +125,9 @@ nb::dict errors_by_segment(const AnyArray& estimate,
   if (every == 0) {
     throw nb::value_error("every: expected at least 1, found 0");
   }
+  if (lengths_m && !std::ranges::all_of(*lengths_m, [](double m) { return m > 0.0; })) {
+    throw nb::value_error("lengths_m: expected lengths above 0");
+  }
   const auto errors = [&] {
     const nb::gil_scoped_release release;
     return segment_errors(
@@ -172,6 +175,9 @@ nb::tuple read_poses(const Path& file, const std::optional<Path>& camera_file) {
 nb::tuple pair_times(const std::vector<double>& first,
                      const std::vector<double>& second,
                      double tolerance_s) {
+  if (!std::ranges::is_sorted(first) || !std::ranges::is_sorted(second)) {
+    throw nb::value_error("pair_by_time: expected times that rise");
+  }
   const TimePairs pairs = pair_by_time(first, second, tolerance_s);
   return nb::make_tuple(array_of(pairs.first), array_of(pairs.second));
 }

@@ -118,6 +118,10 @@ class Reader {
       return fail_at(file_, 0, fail("expected keys with values, found none"));
     }
     format_ = format_of(root);
+    if (root["image_width"]) {  // K and D beside it are another program's
+      format_.width = Format().width;
+      format_.height = Format().height;
+    }
     const YAML::Node fisheye = root["fisheye_model"];  // OpenCV's, in place of a name
     is_fisheye_ = fisheye && fisheye.IsScalar() && fisheye.Scalar() != "0";
     const bool is_chain = format_.body == kKalibr.body;
@@ -233,7 +237,7 @@ class Reader {
       camera.width_px = side(width, number(width, 1.0, kMaxImageSide_px).value_or(1.0));
       camera.height_px = side(height, number(height, 1.0, kMaxImageSide_px).value_or(1.0));
     } else if (!has("resolution")) {
-      miss("image_width and image_height, or resolution: [width, height]");
+      miss(fmt::format("{} and {}, or resolution: [width, height]", width, height));
     } else if (const auto sides = list("resolution", {2}, "[width, height]"); status_) {
       camera.width_px = side("resolution", sides[0]);
       camera.height_px = side("resolution", sides[1]);
@@ -339,12 +343,17 @@ class Reader {
     }
   }
 
-  /// [R | t] of 12 numbers, or 16 with a last row that is not looked at.
+  /// [R | t] of 12 numbers, or 16 with 0, 0, 0, 1 behind: columns in place of rows have t there.
   void set_body(std::optional<Rigid3>& body_from_camera) {
     const std::string& key = format_.body;
     const auto numbers = list(key, {0, 12, 16}, "16 numbers");
     if (!status_ || numbers.empty()) {
       return;
+    }
+    if (numbers.size() == 16 &&
+        std::vector(numbers.end() - 4, numbers.end()) != std::vector{0.0, 0.0, 0.0, 1.0}) {
+      return refuse(key, fmt::format("expected a last row 0, 0, 0, 1, found {}",
+                                     fmt::join(numbers.end() - 4, numbers.end(), ", ")));
     }
     const Matrix34d matrix =
         Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());

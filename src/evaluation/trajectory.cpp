@@ -51,9 +51,18 @@ std::optional<Format> format_of_commas(std::string_view row, bool says_nanosecon
   return Format::kEuroc;
 }
 
+bool names_w_first(std::string_view comment) {
+  constexpr std::string_view kNames[][2] = {{"qw", "qx"}, {"q_w", "q_x"}, {"q_RS_w", "q_RS_x"}};
+  return std::ranges::any_of(kNames, [comment](const auto& names) {
+    return comment.find(names[0]) < comment.find(names[1]);  // none is the largest number
+  });
+}
+
+/// Nullopt: the numbers may be of two formats, or a comment says another order.
 std::optional<Format> format_of(std::string_view text) {
   bool has_comment = false;  // KITTI's have none
   bool says_nanoseconds = false;
+  bool says_w_first = false;
   for (const std::string_view line : split_lines(text)) {
     std::string_view rest = line;
     const std::string_view first = take_word(rest);
@@ -61,6 +70,10 @@ std::optional<Format> format_of(std::string_view text) {
     has_comment = has_comment || is_comment;
     says_nanoseconds =
         says_nanoseconds || (is_comment && line.find("[ns]") != std::string_view::npos);
+    says_w_first = says_w_first || (is_comment && names_w_first(line));
+    if (!first.empty() && !is_comment && says_w_first && !says_nanoseconds) {
+      return std::nullopt;
+    }
     if (!first.empty() && !is_comment) {
       return line.find(',') != std::string_view::npos
                  ? format_of_commas(with_blanks(line), says_nanoseconds)
@@ -300,7 +313,8 @@ Expected<PoseFile> read_pose_file(const fs::path& file) {
   STEMVO_TRY_GET(const std::string text, read_text_file(file));
   const std::optional<Format> format = format_of(text);
   if (!format) {
-    return either_format(file, "8 numbers that begin with nanoseconds");
+    return either_format(file,
+                         "8 numbers that begin with nanoseconds, or qw before qx in a comment");
   }
   Expected<PoseFile> result = parse_rows(file, text, *format);
   if (result) {

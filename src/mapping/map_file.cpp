@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <fstream>
 #include <type_traits>
 #include <utility>
 
@@ -14,6 +15,7 @@
 
 #include "odometry/check_frame.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -314,7 +316,19 @@ Expected<MapFile> parse(std::string_view contents) {
 
 }  // namespace
 
+Status check_place_of_map(const std::filesystem::path& file) {
+  std::string begin(kMagic.size(), '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(begin.data(), std::ssize(begin));
+  return stream.gcount() == 0 || begin == kMagic
+             ? Status()
+             : fail(fmt::format("{}: expected a new file or a map of stemvo to replace, found "
+                                "another kind of file",
+                                file.string()));
+}
+
 Status write_map_file(const std::filesystem::path& file, MapFile map) {
+  STEMVO_TRY(check_place_of_map(file));
   MapWriter writer;
   pass(writer, map);
   return write_text_file(file, sealed_map(writer.bytes()));

@@ -16,7 +16,9 @@ struct MapFile {
   KeptMap map;
 };
 
-/// Replaces the file at once. Error: it cannot be written.
+/// Error: another kind of file, that is not empty, lies there.
+[[nodiscard]] Status check_place_of_map(const std::filesystem::path& file);
+/// Replaces the file at once. Errors: its place is another's; it cannot be written.
 [[nodiscard]] Status write_map_file(const std::filesystem::path& file, MapFile map);
 /// The same to the last bit. Errors: the file is missing, no map, of another version, cut or
 /// damaged; what it holds contradicts itself: numbers that are not finite, keyframes or corners

@@ -28,10 +28,12 @@ Status check_image(const cv::Mat& image, PixelOrder order, const Camera& camera)
 }
 
 Status check_time(double time_s, std::optional<double> last_s) {
-  if (!std::isfinite(time_s) || (last_s && time_s <= *last_s)) {
+  constexpr double kMax_s = 1e11;  // 3,000 years: those since 1970 in another unit are above it
+  if (!(std::abs(time_s) <= kMax_s) || (last_s && time_s <= *last_s)) {
     return fail(fmt::format("time: expected {}, found {} s",
-                            last_s ? fmt::format("one after the last frame's, {} s", *last_s)
-                                   : "a finite number of seconds",
+                            last_s && time_s <= *last_s
+                                ? fmt::format("one after the last frame's, {} s", *last_s)
+                                : fmt::format("a finite number of seconds up to {:g}", kMax_s),
                             time_s));
   }
   return {};
@@ -114,6 +116,14 @@ std::string doubt_of(const Camera& camera) {
   if (view_deg_of(camera) < kMinView_deg) {
     return fmt::format("a field of view of {:.1f} degrees is small: is the focal length in pixels?",
                        view_deg_of(camera));
+  }
+  constexpr double kMaxRatio = 1.2;
+  const double ratio = camera.fx_px / camera.fy_px;
+  if (std::max(ratio, 1.0 / ratio) > kMaxRatio) {
+    return fmt::format(
+        "focal lengths of {:.1f} and {:.1f} pixels are far apart: were the images made smaller in "
+        "one direction more than in the other?",
+        camera.fx_px, camera.fy_px);
   }
   const Eigen::Vector2d center = center_of(camera);
   if ((center.array() - 1.0).abs().maxCoeff() <= kMaxOff) {

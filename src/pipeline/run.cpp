@@ -8,6 +8,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "dataset/frame_files.hpp"
+#include "mapping/map_file.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
@@ -175,6 +176,7 @@ Expected<RunSummary> run_source(RunRequest request,
   STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(request.out_dir, "run", inputs));
   // Before anything is removed: a wrong name costs no earlier result.
   if (request.saved_map) {
+    STEMVO_TRY(check_place_of_map(*request.saved_map));
     STEMVO_TRY(check_can_write(*request.saved_map));
   }
   if (request.video) {

@@ -116,8 +116,8 @@ Expected<std::vector<ThresholdResult>> read_baseline(const std::filesystem::path
   if (bounds.empty()) {
     return fail(place + "expected numbers of a run, as metrics.json has them, found none");
   }
-  for (const char* same :
-       {"sequence", "frames", "alignment"}) {  // else the numbers are not comparable
+  for (const char* same : {"sequence", "first_frame", "frames", "alignment",
+                           "scale_source"}) {  // else the numbers are not comparable
     if (baseline.contains(same) && metrics.contains(same) && baseline[same] != metrics[same]) {
       bounds.push_back({.key = same,
                         .place = place,

@@ -252,6 +252,9 @@ cases = [
     (lambda: stemvo.evaluate(poses, poses[:4]), "expected 4 poses"),
     (lambda: stemvo.evaluate(poses * 2.0, poses), "estimate[0]: expected a rotation"),
     (lambda: stemvo.evaluate(poses, poses, align="up"), "up"),
+    (lambda: stemvo.evaluate(poses + np.eye(4)[3][:, None], poses), "0, 0, 0, 1 below"),
+    (lambda: stemvo.segment_errors(poses, poses, [0.0]), "lengths above 0"),
+    (lambda: stemvo.pair_by_time([1.0, 0.0], [0.0, 1.0]), "expected times that rise"),
 ]
 for number, (call, text) in enumerate(cases):
     try:

@@ -296,6 +296,8 @@ TEST_F(CameraFileTest, TheBodyOfEuroc) {
             1e-12);
   expect_refused(head + good + " 0, 0, 2, 5, 0, 0, 0, 1]\n",
                  {"camera.yaml:7: T_BS: expected a rotation"});
+  expect_refused(head + "T_BS: [0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 3, 4, 5, 1]\n",
+                 {"camera.yaml:4: T_BS: expected a last row 0, 0, 0, 1, found 3, 4, 5, 1"});
   expect_refused(head + good + " 0]\n", {"camera.yaml:7: T_BS: expected 16 numbers, found 9"});
 }
 

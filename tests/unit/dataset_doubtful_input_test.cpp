@@ -67,6 +67,10 @@ TEST_F(DoubtfulInput, ACentreFarFromTheMiddleIsSaid) {
                                    "distortion_model: none\nrate_hz: 10\n");
   const auto cut = open_source(request);
   EXPECT_THAT(cut->warnings, ElementsAre(HasSubstr("(15.5, 7.0) is far from the middle")));
+  request.camera_file = temp_.file("uneven.yaml",
+                                   "resolution: [32, 24]\nintrinsics: [20, 30, 15.5, 11.5]\n"
+                                   "distortion_model: none\nrate_hz: 10\n");
+  EXPECT_THAT(open_source(request)->warnings, ElementsAre(HasSubstr("20.0 and 30.0 pixels")));
   request.camera_file = temp_.file("far.yaml",
                                    "resolution: [32, 24]\nintrinsics: [300, 300, 15.5, 11.5]\n"
                                    "distortion_model: none\nrate_hz: 10\n");
@@ -333,6 +337,8 @@ TEST_F(DoubtfulInput, TrajectoriesBetweenCommas) {
   EXPECT_EQ(tum->poses[0].rotation.w(), 1.0) << "w comes last";
   EXPECT_THAT(read("1700000000500000000,5,6,7,0,0,0,1\n").error().message,
               AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's")));
+  EXPECT_THAT(message_of(read("#t [s], q_RS_w, q_RS_x\n1.25,5,6,7,1,0,0,0\n")),
+              HasSubstr("qw before qx in a comment"));
   EXPECT_TRUE(read("#t [ns]\n1700000000500000000,5,6,7,1,0,0,0\n")->is_of_body);
   EXPECT_THAT(message_of(read("0,5,6,7,1,0,0,0\n50000000,5,6,7,1,0,0,0\n")),
               AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's"), HasSubstr("steps of 5e+07")));

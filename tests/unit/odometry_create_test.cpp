@@ -165,6 +165,7 @@ TEST(OdometryProcess, ATimeThatDoesNotRiseIsAnErrorThatNamesBothAndChangesNothin
   EXPECT_THAT(message(-2.5), AllOf(HasSubstr("after the last frame's, -2.5 s"), HasSubstr("-2.5")));
   EXPECT_THAT(message(-3.0), AllOf(HasSubstr("-2.5 s"), HasSubstr("found -3 s")));
   EXPECT_THAT(message(std::numeric_limits<double>::infinity()), HasSubstr("found inf"));
+  EXPECT_THAT(message(1.7e18), HasSubstr("up to 1e+11")) << "nanoseconds since 1970";
   EXPECT_EQ(message(-2.4), "stationary");
   EXPECT_EQ(odometry.process(image_at(0), PixelOrder::kRgb, 9.0)->time_s, 9.0);
 }

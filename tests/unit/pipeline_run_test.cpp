@@ -266,8 +266,10 @@ TEST_F(PipelineRun, AMapIsSavedAndTakenUpAgain) {
   EXPECT_GT(second->report.map->num_keyframes, first->report.map->num_keyframes);
   request_.config.stem.model = "log";
   EXPECT_THAT(error_of(request_), HasSubstr("saved.map: expected a map of channel 'log"));
-  request_.saved_map = folder_ / "nowhere/saved.map";
   request_.map.reset();
+  request_.saved_map = folder_.file("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  EXPECT_THAT(error_of(request_), HasSubstr("poses.txt: expected a new file or a map of stemvo"));
+  request_.saved_map = folder_ / "nowhere/saved.map";
   EXPECT_THAT(error_of(request_), HasSubstr("nowhere/saved.map: cannot write"));
 }
 

@@ -188,6 +188,13 @@ TEST(Check, ABaselineOfAnotherRecordingOtherFramesOrAnotherAlignmentIsAProblem) 
   EXPECT_THAT(problem_of(compare(R"({"sequence": "00", "t_rel_percent": 0.1})",
                                  R"({"sequence": "03", "t_rel_percent": 0.1})")),
               HasSubstr(R"(sequence: expected "00" as in the run, found "03")"));
+  for (const char* key : {"first_frame", "scale_source"}) {
+    const auto run = [key](int value) {
+      return fmt::format(R"({{"{}": {}, "t_rel_percent": 0.1}})", key, value);
+    };
+    EXPECT_THAT(problem_of(compare(run(0), run(5))),
+                HasSubstr("expected 0 as in the run, found 5"));
+  }
   EXPECT_THAT(problem_of(compare(kBaseline, "{}")), HasSubstr("expected numbers of a run"));
 }
 
