@@ -52,7 +52,7 @@ class Times : public NeedsClips {
       const cv::Mat image = clip_->read(given.index).value();
       const FrameResult frame = odometry.process(image, order_of(image), given.time_s).value();
       estimate.push_back(frame.world_from_camera);
-      truth.push_back((*clip_->ground_truth)[given.index]);
+      truth.push_back(clip_->ground_truth->poses[given.index]);
       outcome.inliers += frame.num_inliers / static_cast<double>(frames.size());
     }
     const Metrics metrics = evaluate(rescale_steps(estimate, truth), truth, {});
@@ -98,7 +98,7 @@ TEST_F(Times, DroppedFramesAndJitterCostLittleAndFramesTakenForEvenlySpacedMore)
 /// An image tells where its points are; where it tells nothing, time alone says how far the camera
 /// went.
 TEST_F(Times, ADarkFrameLiesAsFarAheadAsItsTimeSays) {
-  const Trajectory& truth = *clip_->ground_truth;
+  const Trajectory& truth = clip_->ground_truth->poses;
   constexpr std::size_t kSeen = 30;
   constexpr std::size_t kDark = 34;  // those between are dropped
   const auto error = [&](double dark_s) {
