@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Loaded by dataset/video_decoder.cpp; the only source that links OpenCV's videoio.
+// Loaded by dataset/video_stream.cpp; the only source that links OpenCV's videoio.
 #include <cstdlib>
 #include <memory>
 #include <string>
