@@ -27,7 +27,7 @@ void add_bounds(const std::filesystem::path& file,
   const auto where = [&](const YAML::Node& at) {
     return fmt::format("{}:{}: ", file.string(), at.Mark().line + 1);
   };
-  const std::string key = name.Scalar();
+  const std::string& key = name.Scalar();
   if (!name.IsScalar() || !node.IsMap() || node.size() == 0) {
     const std::string found = node.IsScalar() ? node.Scalar() : "no bound";
     bounds.push_back(
