@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <sstream>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -73,16 +74,11 @@ Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::pa
 }
 
 /// Goes down along the dots; null when there is no such key.
-const Json* find_metric(const Json& root, std::string_view key) {
+const Json* find_metric(const Json& root, const std::string& key) {
   const Json* node = &root;
-  while (!key.empty()) {
-    const std::size_t dot = key.find('.');
-    const std::string part(key.substr(0, dot));
-    key.remove_prefix(dot == std::string_view::npos ? key.size() : dot + 1);
-    // Without ground truth a whole group is null: so is everything in it.
-    if (node->is_null()) {
-      return node;
-    }
+  std::istringstream parts(key);
+  // Without ground truth a whole group is null: so is everything in it.
+  for (std::string part; !node->is_null() && std::getline(parts, part, '.');) {
     if (!node->is_object() || !node->contains(part)) {
       return nullptr;
     }
@@ -130,9 +126,6 @@ Expected<std::vector<ThresholdResult>> read_baseline(const std::filesystem::path
 
 void judge(ThresholdResult& result, const Json& metrics, const std::filesystem::path& file) {
   const Json* metric = find_metric(metrics, result.key);
-  if (!result.problem.empty()) {
-    return;
-  }
   if (metric == nullptr) {
     result.problem = fmt::format("{}expected a metric of {}, which lists them, found '{}'",
                                  result.place, file.string(), result.key);
@@ -184,7 +177,9 @@ Expected<std::vector<ThresholdResult>> check_metrics(const CheckRequest& request
     results.insert(results.end(), bounds.begin(), bounds.end());
   }
   for (ThresholdResult& result : results) {
-    judge(result, metrics, request.metrics);
+    if (result.problem.empty()) {
+      judge(result, metrics, request.metrics);
+    }
   }
   return results;
 }

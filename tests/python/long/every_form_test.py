@@ -181,6 +181,15 @@ def drive(request, tmp_path_factory):
     return Drive(folder, pathlib.Path(os.environ["STEMVO_SHARED_DATA"]) / "kitti/sequences/06")
 
 
+@pytest.fixture(autouse=True)
+def clear(drive):
+    """Recordings and results of 134 cases would fill a small disk."""
+    before = set(drive.folder.iterdir())
+    yield
+    for folder in set(drive.folder.iterdir()) - before:
+        shutil.rmtree(folder)
+
+
 def camera_files(drive, model, k):
     """Name of the form, of the file, and its text."""
     (fx, fy), (cx, cy), matrix, size = drive.focal, drive.centre, drive.matrix, (drive.width, drive.height)
