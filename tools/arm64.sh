@@ -105,6 +105,7 @@ emulated --version
 [[ -n ${STEMVO_SHARED_DATA:-} ]] || { echo "arm64.sh: STEMVO_SHARED_DATA is not set: no clip was run" && exit 0; }
 readonly CLIP=$STEMVO_SHARED_DATA/kitti/sequences/06
 emulated run "$CLIP" --out "$BUILD/clip"
+build/release/stemvo check "$BUILD/clip/metrics.json" --against tests/regression/thresholds/kitti_06_camera_height.yaml
 build/release/stemvo run "$CLIP" --out "$BUILD/clip-here"
 # Instructions round differently, and what is chosen by a hair may be chosen otherwise.
 build/lab/bin/python - "$BUILD"/clip{,-here}/trajectory_kitti.txt <<'PYTHON'

@@ -36,6 +36,8 @@ struct Format {
         coefficients, body,   "rate_hz",    "camera_height"};
     if (is_of_matrices) {
       keys.insert(keys.end(), {projection, "roi", "binning_x", "binning_y"});
+    } else if (has_more_keys) {
+      keys.push_back("timeshift_cam_imu");
     }
     return keys;
   }
@@ -98,6 +100,7 @@ class Reader {
     check_projection(result);
     result.rate_hz = number("rate_hz", 1e-9, 1e5);
     result.camera_height_m = number("camera_height", 1e-9, 1000.0);
+    result.imu_from_camera_s = number("timeshift_cam_imu", -10.0, 10.0).value_or(0.0);
     return status_ ? Expected<CameraFile>(result) : status_.error();
   }
 

@@ -17,6 +17,7 @@ struct CameraFile {
   std::optional<double> rate_hz;
   std::optional<double> camera_height_m;   ///< above the road
   std::optional<Rigid3> body_from_camera;  ///< EuRoC's T_BS, or of Kalibr's T_cam_imu
+  double imu_from_camera_s = 0.0;          ///< added to a frame's time, the gyro's (Kalibr)
   std::vector<std::string> warnings;       ///< what may be meant otherwise
 
   [[nodiscard]] std::optional<Eigen::Quaterniond> camera_from_imu() const {

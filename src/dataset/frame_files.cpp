@@ -349,6 +349,7 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
   frames.given_calibration = camera_path;
   frames.camera_height_m = camera_file.camera_height_m;
   frames.camera_from_imu = camera_file.camera_from_imu();
+  frames.imu_from_camera_s = camera_file.imu_from_camera_s;
   STEMVO_TRY(add_view(frames, view, request.masks, [files = frames.files, kind](std::size_t i) {
     return io::read_image(files[i], kind.is_color, kind.size, kind.levels);
   }));

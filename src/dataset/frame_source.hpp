@@ -62,6 +62,7 @@ struct FrameSource {
   std::optional<std::filesystem::path> given_calibration;
   std::optional<double> camera_height_m;  ///< above the road, where a camera file says it
   std::optional<Eigen::Quaterniond> camera_from_imu;  ///< where a camera file says it
+  double imu_from_camera_s = 0.0;                     ///< added to a frame's time, the gyro's
   std::vector<std::string> notes;                     ///< how it was read, for people
   std::vector<std::string> warnings;                  ///< what may be wrong with what was given
   bool is_kitti = false;                              ///< whose camera is 1.65 m above a road

@@ -104,6 +104,15 @@ Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
   for (const TimedRow& row : found.rows) {
     times.rows.push_back(row.time_s);
   }
+  constexpr std::size_t kFew = 3;
+  const bool is_counted = std::ranges::adjacent_find(times.rows, [](double a, double b) {
+                            return b != a + 1.0;
+                          }) == times.rows.end();
+  if (is_counted && times.rows.size() >= kFew && times.rows[0] <= 1.0) {
+    times.note = fmt::format(
+        "{}: times {:g}, {:g}, .. are taken for seconds; numbers of frames would be no times",
+        file.string(), times.rows[0], times.rows[1]);
+  }
   if (times.rows.size() < num_expected) {
     return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
                             file.string(), num_expected, times.rows.size()));

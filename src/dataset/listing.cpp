@@ -188,6 +188,53 @@ bool are_seconds(const std::string& before, const std::set<std::string>& numbers
          std::regex_match(before, kMinute);
 }
 
+/// Error: frames of several cameras in pairs ("7_cam0", "7_cam1"), or an image beside its copy
+/// ("7 (1).png").
+Status check_names(const std::vector<fs::path>& files, const fs::path& given) {
+  static const std::regex kCopy("(.+?)( \\([0-9]+\\)|[ _-]+[Cc]opy.*)");
+  static const std::regex kCamera("(.*[0-9][^0-9]*?)([_-]?[A-Za-z]{2,}[_-]?[0-9])");
+  std::set<std::string> stems;
+  std::set<std::string> moments;
+  std::set<std::string> cameras;
+  for (const fs::path& file : files) {
+    const std::string stem = file.stem().string();
+    std::smatch part;
+    const bool has_camera = std::regex_match(stem, part, kCamera);
+    moments.insert(has_camera ? part[1].str() : stem);
+    cameras.insert(has_camera ? part[2].str() : "");
+    stems.insert(stem);
+  }
+  const auto fail_of = [&](const fs::path& file, const std::string& frames) {
+    return fail(fmt::format(
+        "{}: expected frames of one camera alone, found {}; a quoted pattern tells which, as '{}'",
+        given.string(), file.filename().string(),
+        (file.parent_path() / ("*" + frames + file.extension().string())).string()));
+  };
+  constexpr double kMost = 0.9;  // some frames may be missing
+  const auto num_pairs = static_cast<double>(moments.size() * cameras.size());
+  if (cameras.size() > 1 && moments.size() > cameras.size() &&
+      static_cast<double>(files.size()) > kMost * num_pairs) {
+    return fail_of(files[1], *cameras.begin());
+  }
+  for (const fs::path& file : files) {
+    const std::string stem = file.stem().string();
+    std::smatch part;
+    if (std::regex_match(stem, part, kCopy) && stems.contains(part[1])) {
+      return fail_of(file, "[0-9]");
+    }
+  }
+  return {};
+}
+
+/// An image without a number among those that have one: a mask, a picture of the board.
+std::string warn_of_names(const std::vector<fs::path>& files) {
+  const auto has_none = [](const fs::path& file) { return numbers_of(file).empty(); };
+  const auto odd = std::ranges::find_if(files, has_none);
+  return odd == files.end() || 2 * std::ranges::count_if(files, has_none) >= std::ssize(files)
+             ? ""
+             : fmt::format("{}: has no number, and is taken for a frame", odd->string());
+}
+
 /// Error: two images of one number, which are two cameras or one picture twice; or names with the
 /// same last numbers behind several beginnings (cam1_, cam2_), which are as many cameras. Where
 /// there are more beginnings than numbers, they are hours or seconds; so are whole minutes.
@@ -292,12 +339,14 @@ Expected<Listing> list_images(const fs::path& given) {
   std::sort(result.files.begin(), result.files.end(), [](const fs::path& a, const fs::path& b) {
     return comes_before(a.filename().string(), b.filename().string());
   });
-  if (const Status single = check_numbers(result.files, given); !single) {
+  Status single = check_numbers(result.files, given);
+  if (single = single ? check_names(result.files, given) : single; !single) {
     if (pattern == "*") {
       return single.error();
     }
     result.warning = single.error().message;  // who gave a pattern may mean both
   }
+  result.warning = result.warning.empty() ? warn_of_names(result.files) : result.warning;
   result.name = recording_name(result.folder) + name_part(pattern);
   return result;
 }

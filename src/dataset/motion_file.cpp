@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <regex>
 
 #include <fmt/format.h>
 
@@ -18,6 +19,19 @@ constexpr double kMaxGap_s = 0.1;  ///< between rates that a rotation is integra
 Expected<std::vector<double>> numbers_of(const TimedRow& row, const std::filesystem::path& file) {
   auto numbers = parse_numbers(row.rest, split_words(row.rest).size());
   return numbers ? numbers : fail_at(file, row.line, numbers.error());
+}
+
+/// Error: a comment of the file names a unit that its numbers are not read in.
+Status check_unit(const std::filesystem::path& file, const char* other, const char* expected) {
+  STEMVO_TRY_GET(const auto lines, read_lines(file));
+  const std::regex name(other, std::regex::icase);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    std::smatch found;
+    if (std::regex_search(lines[i], found, name)) {
+      return fail_at(file, i, fail(fmt::format("expected {}, found {}", expected, found.str())));
+    }
+  }
+  return {};
 }
 
 /// The rate at a time, between the rows around it; the first or the last one outside.
@@ -37,6 +51,7 @@ Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file,
                                           const std::optional<std::pair<double, double>>& span_s) {
   constexpr double kSigmaShare = 0.02;
   constexpr double kMinSigma = 0.05;
+  STEMVO_TRY(check_unit(file, "km/?h|kph|mph|knots", "m/s"));
   STEMVO_TRY_GET(const auto found, read_timed_rows(file, {2, 3}, "a time, m/s and maybe a sigma",
                                                    {.span_s = span_s}));
   TimedRows<SpeedRow> speeds{.rows = {}, .note = found.note};
@@ -56,6 +71,7 @@ Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file,
 Expected<TimedRows<GyroRow>> read_gyro(const std::filesystem::path& file,
                                        const std::optional<std::pair<double, double>>& span_s) {
   constexpr double kMinStep_s = 0.9e-4;
+  STEMVO_TRY(check_unit(file, "deg[a-z]*(/|_per_)s|dps", "rad/s"));
   STEMVO_TRY_GET(
       const auto found,
       read_timed_rows(file, {4, 7}, "a time and rad/s about x, y and z",

@@ -287,10 +287,18 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   frames.camera_height_m = camera.camera_height_m;
   frames.warnings = camera.warnings;
   add_line(frames.warnings, warn_of_turn(*stream, owner));
-  if (request.rate_hz && stream->num_counted() == 0) {
+  constexpr double kAlike = 0.05;
+  const auto& said_hz = request.rate_hz ? request.rate_hz : camera.rate_hz;
+  if (said_hz && stream->num_counted() == 0 &&
+      (request.rate_hz || std::abs(*said_hz / stream->rate_hz() - 1.0) > kAlike)) {
     frames.warnings.push_back(
-        fmt::format("--rate {}: {} says when each frame was taken, which goes before it",
-                    *request.rate_hz, owner));
+        fmt::format("{} {}: {} says when each frame was taken, which goes before it",
+                    request.rate_hz ? "--rate" : "rate_hz", *said_hz, owner));
+  }
+  if (range.end && frames.stream->expected_frames > 0 && all < *range.end) {
+    frames.warnings.push_back(
+        fmt::format("--frames {}:{}: {} has {} frames, as its container counts them", range.begin,
+                    *range.end, owner, all));
   }
   if (stream->decoder().gray_bits > 8) {
     frames.warnings.push_back(fmt::format(
@@ -298,6 +306,7 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
         owner, stream->decoder().gray_bits));
   }
   frames.camera_from_imu = camera.camera_from_imu();
+  frames.imu_from_camera_s = camera.imu_from_camera_s;
   if (request.ground_truth) {
     STEMVO_TRY_GET(const auto truth, read_truth(*request.ground_truth, request.camera_file));
     STEMVO_TRY(check_length(truth, frames, request));

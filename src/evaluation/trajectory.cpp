@@ -75,10 +75,11 @@ std::optional<Format> format_of(std::string_view text) {
       return std::nullopt;
     }
     if (!first.empty() && !is_comment) {
-      return line.find(',') != std::string_view::npos
-                 ? format_of_commas(with_blanks(line), says_nanoseconds)
-             : has_comment || split_words(line).size() == 8 ? Format::kTum
-                                                            : Format::kKitti;
+      const std::string_view row = line.substr(0, line.find('#'));
+      return row.find(',') != std::string_view::npos
+                 ? format_of_commas(with_blanks(row), says_nanoseconds)
+             : has_comment || split_words(row).size() == 8 ? Format::kTum
+                                                           : Format::kKitti;
     }
   }
   return has_comment ? Format::kTum : Format::kKitti;

@@ -44,6 +44,7 @@ Status add_gyro(const RunRequest& request, const FrameSource& sequence, BesideFr
   auto& rows = found.rows;
   const auto& camera_from_imu = sequence.camera_from_imu;
   for (dataset::GyroRow& row : rows) {
+    row.time_s -= sequence.imu_from_camera_s;
     row.rad_per_s = camera_from_imu.value_or(Eigen::Quaterniond::Identity()) * row.rad_per_s;
   }
   beside.note += fmt::format(", {} turn rates{}", rows.size(),

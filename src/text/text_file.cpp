@@ -76,6 +76,8 @@ Expected<std::string> read_text_file(const fs::path& file, int max_MB) {
   std::string text(size, '\0');
   std::ifstream stream(file, std::ios::binary);
   stream.read(text.data(), static_cast<std::streamsize>(size));
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";  // Windows' editors begin UTF-8 with it
+  text.erase(0, text.starts_with(kMark) ? kMark.size() : 0);
   return stream ? Expected<std::string>(std::move(text)) : cannot("read", file, errno);
 }
 

@@ -153,6 +153,7 @@ constexpr const char* kKalibr =
     "  intrinsics: [190.0, 191.0, 254.0, 256.0]\n"
     "  resolution: [512, 511]\n"
     "  rostopic: /cam0/image_raw\n"
+    "  timeshift_cam_imu: -0.0125\n"
     "cam1:\n"
     "  intrinsics: [1, 2, 3, 4]\n";
 
@@ -195,6 +196,7 @@ constexpr const char* kRos =
 TEST_F(CameraFileTest, KalibrsChain) {
   const auto file = read_camera_file(folder_.file("camchain.yaml", kKalibr));
   EXPECT_THAT(file->warnings, ElementsAre(HasSubstr("cam0 (/cam0/image_raw) is taken")));
+  EXPECT_EQ(file->imu_from_camera_s, -0.0125);
   EXPECT_EQ(file->camera.fy_px, 191.0);
   EXPECT_EQ(file->camera.height_px, 511);
   EXPECT_EQ(file->camera.distortion, Distortion::kEquidistant);

@@ -199,6 +199,39 @@ TEST_F(DoubtfulInput, FramesThatAreThereTwiceAreRefused) {
       HasSubstr("01_02_00.png"));
 }
 
+TEST_F(DoubtfulInput, PairsOfCamerasBehindTheNumberCopiesAndAMaskAreNoFrames) {
+  FrameSourceRequest pairs = write_images(
+      {"1_cam0.png", "1_cam1.png", "2_cam0.png", "2_cam1.png", "3_cam0.png", "3_cam1.png"});
+  EXPECT_THAT(error_of(pairs), AllOf(HasSubstr("found 1_cam1.png"), HasSubstr("*_cam0.png'")));
+  pairs.sequence_dir /= "*_cam0.png";
+  EXPECT_EQ(open_source(pairs)->files.size(), 3U);
+  fs::remove_all(temp_ / "drive");
+  FrameSourceRequest copied = write_images({"7.png", "7 (1).png", "8.png"});
+  EXPECT_THAT(error_of(copied), AllOf(HasSubstr("7 (1).png"), HasSubstr("*[0-9].png'")));
+  copied.sequence_dir /= "*[0-9].png";
+  EXPECT_EQ(open_source(copied)->files.size(), 2U);
+  fs::remove_all(temp_ / "drive");
+  const auto masked = open_source(write_images({"1.png", "2.png", "3.png", "mask.png"}));
+  EXPECT_THAT(masked->warnings, ElementsAre(HasSubstr("mask.png: has no number")));
+  for (const auto& one_camera : std::vector<std::vector<std::string>>{
+           {"cam0_frame1.png", "cam0_frame2.png", "cam0_frame3.png"},
+           {"img (1).png", "img (2).png", "img (3).png"},
+           {"12h30m08s1.png", "12h30m08s2.png", "12h30m09s1.png", "12h30m09s2.png",
+            "12h30m10s1.png", "12h30m10s2.png"}}) {
+    fs::remove_all(temp_ / "drive");
+    const auto source = open_source(write_images(one_camera));
+    EXPECT_TRUE(source && source->warnings.empty()) << one_camera[0] << message_of(source);
+  }
+}
+
+TEST_F(DoubtfulInput, NumbersOfFramesAreNoTimes) {
+  FrameSourceRequest request = write_images({"1.png", "2.png", "3.png"});
+  request.times = temp_.file("times.txt", "0\n1\n2\n");
+  EXPECT_THAT(open_source(request)->notes, ElementsAre(HasSubstr("times 0, 1, .. are taken for")));
+  request.times = temp_.file("times.txt", "0\n1\n2.5\n");
+  EXPECT_THAT(open_source(request)->notes, IsEmpty());
+}
+
 TEST_F(DoubtfulInput, AnOrientationByExifIsSaid) {
   const FrameSourceRequest request = write_images({"1.jpg", "2.jpg"});
   const fs::path first = request.sequence_dir / "1.jpg";
@@ -285,7 +318,7 @@ TEST_F(DoubtfulInput, SixteenBitsAreStretchedByWhatIsUsed) {
 dataset::VideoDecoder told_decoder(const std::vector<double>& times_ms, int turned_deg) {
   const auto next = std::make_shared<std::size_t>(0);
   return {.size = {32, 24},
-          .rate_hz = 20.0,
+          .rate_hz = 10.0,
           .turned_deg = turned_deg,
           .grab = [=] { return ++*next <= times_ms.size(); },
           .retrieve = [] { return cv::Mat(24, 32, CV_8UC3, cv::Scalar::all(90)); },

@@ -36,6 +36,13 @@ TEST_F(MotionFile, WhatIsNoRowIsRefusedWithItsLine) {
               HasSubstr("motion.txt:1: expected a time and rad/s"));
 }
 
+TEST_F(MotionFile, OtherUnitsThatACommentNamesAreRefused) {
+  EXPECT_THAT(speed_error("# t, speed [km/h]\n0 36\n"),
+              HasSubstr("motion.txt:1: expected m/s, found km/h"));
+  EXPECT_THAT(message_of(read_gyro(write("0 1 2 3\n# deg/s\n"))),
+              HasSubstr("motion.txt:2: expected rad/s, found deg/s"));
+}
+
 TEST_F(MotionFile, EurocsTimesAreNanoseconds) {
   const auto gyro = read_gyro(
       write("#timestamp [ns],w_x [rad s^-1],w_y,w_z,a_x,a_y,a_z\n2500000000,0.1,0.2,0.3,9,8,7\n"));

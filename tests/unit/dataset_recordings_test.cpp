@@ -179,6 +179,13 @@ TEST_F(Recordings, AVideoIsReadFrameByFrame) {
   EXPECT_THAT(source->warnings, IsEmpty());
   video.rate_hz = 50.0;
   EXPECT_THAT(open_source(video)->warnings, ElementsAre(HasSubstr("--rate 50: ")));
+  video.rate_hz.reset();
+  video.camera_file = camera("rate_hz: 25\n");
+  EXPECT_THAT(open_source(video)->warnings, IsEmpty());
+  video.camera_file = camera("rate_hz: 10\n");
+  video.frames = FrameRangeRequest{1, 9};
+  EXPECT_THAT(open_source(video)->warnings,
+              ElementsAre(HasSubstr("rate_hz 10: "), HasSubstr("--frames 1:9: ")));
 }
 
 TEST_F(Recordings, AVideoIsTurnedAsPlayersDo) {

@@ -156,7 +156,9 @@ TEST(PoseFile, FormatsAreToldByTheirRows) {
   EXPECT_THAT(euroc->timestamps_s, ElementsAre(3.5));
   EXPECT_TRUE(euroc->is_of_body);
   EXPECT_EQ(euroc->poses[0].rotation.x(), 1.0) << "w comes first";
-  for (const auto& file : {*kitti, *tum, *euroc}) {
+  const auto commas = read_pose_file(folder.file("d", "3.5,5,6,7,0,0,0,1 # a, b\n"));
+  EXPECT_EQ(commas->poses[0].rotation.w(), 1.0);
+  for (const auto& file : {*kitti, *tum, *euroc, *commas}) {
     EXPECT_EQ(file.poses.at(0).translation, Eigen::Vector3d(5, 6, 7));
   }
 }

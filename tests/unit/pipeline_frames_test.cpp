@@ -31,6 +31,16 @@ class FramePipeline : public SmallDrive {
   const FrameSource frames_ = open_kitti(sequence_, {}).value();
 };
 
+TEST_F(FramePipeline, AGyrosClockIsTheCamerasByItsShift) {
+  FrameSource frames = frames_;
+  frames.imu_from_camera_s = 0.25;
+  RunRequest request;
+  request.gyro = folder_.file("gyro.txt", "0.25 0 0 1\n0.75 0 0 1\n");
+  const auto beside = pipeline::read_beside_frames(request, frames);
+  EXPECT_EQ(beside->gyro.front().time_s, 0.0);
+  EXPECT_EQ(beside->gyro.back().time_s, 0.5);
+}
+
 TEST_F(FramePipeline, GivesTheSamePosesAsOneFrameAfterTheOtherForAnyNumberOfThreads) {
   std::vector<FrameResult> expected;
   PhasedOdometry plain = odometry();

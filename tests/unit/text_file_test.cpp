@@ -27,6 +27,15 @@ TEST(WriteTextFile, NamesTheFileItCannotWriteAndLeavesNothing) {
   EXPECT_EQ(num_files(folder), 1);
 }
 
+TEST(ReadTextFile, AMarkOfWindowsEditorsIsNoText) {
+  const TempFolder folder;
+  EXPECT_EQ(read_text_file(folder.file("camera.yaml",
+                                       "\xEF\xBB\xBF"
+                                       "a: 1"))
+                .value(),
+            "a: 1");
+}
+
 TEST(OneLine, IsOneAndNotLong) {
   EXPECT_EQ(one_line("a\nb"), "a b");
   EXPECT_EQ(one_line(std::string(1000, 'x')), std::string(300, 'x') + "..");
