@@ -15,6 +15,8 @@ namespace {
 
 /// Numbers change for so many merged keyframes at once.
 constexpr int kMinMerged = 16;
+/// A loop of fewer of a keyframe's corners says too little to stand for the keyframe.
+constexpr double kMinShared = 0.2;
 
 /// How a merged keyframe hangs on a place.
 struct Hanging {
@@ -37,8 +39,10 @@ class Merge {
       }
     }
     for (const Loop& loop : map_.loops) {
-      if (!loop.corners.empty() && loop.from < loop.to &&
-          sigmas_off(map_, loop) < kMaxTakenInSigmas) {
+      const auto num_corners = map_.keyframes[slot(loop.to)].corners.size();
+      if (static_cast<double>(loop.corners.size()) >
+              kMinShared * static_cast<double>(num_corners) &&
+          loop.from < loop.to && sigmas_off(map_, loop) < kMaxTakenInSigmas) {
         recognized_[slot(loop.to)] = &loop;
       }
     }

@@ -71,23 +71,39 @@ int num_cells(const std::vector<Eigen::Vector2d>& uv, const Camera& camera) {
   return static_cast<int>(std::ranges::count(cells, char{1}));
 }
 
-/// Sightings of one view's landmarks by the other one.
-bool is_seen(
-    const Similarity3& by_from_of, const PlaceView& of, int mine, const PlaceView& by, int other) {
-  const Eigen::Vector3d landmark = landmark_of(of, mine);
+/// Where a view has the landmark of another one, whose depth may be wrong.
+struct Piece {
+  Eigen::Vector2d from;
+  Eigen::Vector2d way;
+
+  [[nodiscard]] double distance_px(const Eigen::Vector2d& uv) const {
+    const Eigen::Vector2d to = uv - from;
+    return (to - std::clamp(to.dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0) * way)
+        .norm();
+  }
+};
+
+/// nullopt: behind the camera.
+std::optional<Piece> piece_of(const Similarity3& by_from_of,
+                              const Eigen::Vector3d& landmark,
+                              const Camera& by) {
   const Eigen::Vector3d near = by_from_of * ((1.0 - kDepthError) * landmark);
   const Eigen::Vector3d far = by_from_of * ((1.0 + kDepthError) * landmark);
   if (std::min(near.z(), far.z()) <= 0.0) {
-    return false;
+    return std::nullopt;
   }
-  const Eigen::Vector2d from = by.camera.project(near);
-  const Eigen::Vector2d way = by.camera.project(far) - from;
-  const Eigen::Vector2d seen = uv_of(by, other) - from;
-  const double share = std::clamp(seen.dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0);
-  return (seen - share * way).norm() <= bound_px(by.camera);
+  const Eigen::Vector2d from = by.project(near);
+  return Piece{from, by.project(far) - from};
 }
 
-/// Landmarks of `of` where `by` has corners like them near their projections: each other's
+/// Sightings of one view's landmarks by the other one.
+bool is_seen(
+    const Similarity3& by_from_of, const PlaceView& of, int mine, const PlaceView& by, int other) {
+  const auto piece = piece_of(by_from_of, landmark_of(of, mine), by.camera);
+  return piece && piece->distance_px(uv_of(by, other)) <= bound_px(by.camera);
+}
+
+/// Landmarks of `of` where `by` has corners like them near the pieces of their rays: each other's
 /// nearest.
 std::vector<DescriptorPair> match_near(const Similarity3& by_from_of,
                                        const PlaceView& of,
@@ -103,15 +119,15 @@ std::vector<DescriptorPair> match_near(const Similarity3& by_from_of,
     if (!of.corners[i].has_landmark() || of.descriptors[i] == kNoDescriptor) {
       continue;
     }
-    const Eigen::Vector3d x = by_from_of * landmark_of(of, mine);
-    if (x.z() <= 0.0) {
+    const auto piece = piece_of(by_from_of, landmark_of(of, mine), by.camera);
+    if (!piece) {
       continue;
     }
-    const Eigen::Vector2f uv = by.camera.project(x).cast<float>();
     int nearest = -1;
     int least = kGuidedBits + 1;
     for (std::size_t j = 0; j < by.corners.size(); ++j) {
-      if ((by.corners[j].uv - uv).norm() <= radius_px && by.descriptors[j] != kNoDescriptor) {
+      if (by.descriptors[j] != kNoDescriptor &&
+          piece->distance_px(uv_of(by, static_cast<int>(j))) <= radius_px) {
         const int num_bits = differing_bits(of.descriptors[i], by.descriptors[j]);
         if (num_bits < least) {
           least = num_bits;

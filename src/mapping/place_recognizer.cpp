@@ -105,7 +105,7 @@ int PlaceRecognizer::end_of_far() const {
 bool PlaceRecognizer::asks(const KeptKeyframe& keyframe) const {
   return num_lookups_ == 0 ||
          (keyframe.frame - last_frame_ >= kMinFrames &&
-          (is_joining_ ||
+          (is_unconfirmed_ ||
            is_share_below(kMaxShared, num_shared(last_tracks_, track_ids_of(keyframe)),
                           last_tracks_.size())));
 }
@@ -121,7 +121,7 @@ void PlaceRecognizer::begin_lookup(const KeptKeyframe& keyframe) {
   ++num_lookups_;
   last_pose_ = keyframe.world_from_camera;
   last_frame_ = keyframe.frame;
-  is_joining_ = false;
+  is_unconfirmed_ = false;
   last_tracks_ = track_ids_of(keyframe);
   shows_kept_place_ =
       !kept_tracks_.empty() &&
@@ -155,7 +155,7 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
       sightings_.share_what_joins(map, keyframe.corners.size(), *sighting);
     }
     const bool is_found = sightings_.confirm(map, *sighting, joins);
-    is_joining_ = is_joining_ || (joins && !is_found && sighting->may_join());
+    is_unconfirmed_ = is_unconfirmed_ || (!is_found && (!joins || sighting->may_join()));
     if (is_found) {
       found = sighting->loop;
       if (sighting->share >= kSamePlace) {

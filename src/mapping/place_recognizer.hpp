@@ -138,7 +138,7 @@ class PlaceRecognizer {
   int num_lookups_ = 0;
   bool shows_kept_place_ = false;
   bool may_be_locating_ = false;
-  bool is_joining_ = false;  ///< a sighting of another map waits for others that say the same
+  bool is_unconfirmed_ = false;  ///< a sighting waits for others that say the same
   /// Where frames were located last, unconfirmed: map_from_camera.
   std::vector<Similarity3> located_;
 };
