@@ -235,6 +235,11 @@ std::string warn_of_names(const std::vector<fs::path>& files) {
              : fmt::format("{}: has no number, and is taken for a frame", odd->string());
 }
 
+std::string letters_of(std::string name) {
+  std::erase_if(name, [](unsigned char c) { return std::isdigit(c) != 0; });
+  return name;
+}
+
 /// Error: two images of one number, which are two cameras or one picture twice; or names with the
 /// same last numbers behind several beginnings (cam1_, cam2_), which are as many cameras. Where
 /// there are more beginnings than numbers, they are hours or seconds; so are whole minutes.
@@ -264,6 +269,16 @@ Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) 
     if (firsts.size() > 1 && numbers.size() >= firsts.size() && numbers.size() > 1 &&
         !are_seconds(parts_of(firsts[0]).before, numbers)) {
       return one_time(given, firsts[0], firsts[1]);
+    }
+  }
+  // Cameras whose time stamps are their own, but of one time.
+  constexpr std::size_t kStampDigits = 9;
+  for (auto b = groups.begin(), a = b; b != groups.end(); a = b++) {
+    const auto& [early, late] = std::tie(a->second.numbers, b->second.numbers);
+    if (a != b && early.begin()->size() >= kStampDigits && *early.begin() < *late.rbegin() &&
+        *late.begin() < *early.rbegin() &&
+        letters_of(a->first.first) != letters_of(b->first.first)) {
+      return one_time(given, a->second.first, b->second.first);
     }
   }
   return {};

@@ -28,13 +28,16 @@ Similarity3 scale_about_origin(std::span<const Eigen::Vector3d> source,
                                std::span<const Eigen::Vector3d> target) {
   double xy = 0.0;
   double xx = 0.0;
+  double yy = 0.0;
   for (std::size_t i = 0; i < source.size(); ++i) {
     xy += source[i].dot(target[i]);
     xx += source[i].squaredNorm();
+    yy += target[i].squaredNorm();
   }
   Similarity3 result;
-  const double scale = xy / xx;
-  // Opposite directions have no scale: a negative one would mirror the trajectory.
+  // Opposite directions have no scale, a negative one would mirror the trajectory: then that of one
+  // size.
+  const double scale = xy > 0.0 ? xy / xx : std::sqrt(yy / xx);
   result.scale = std::isfinite(scale) && scale > 0.0 ? scale : 1.0;
   return result;
 }

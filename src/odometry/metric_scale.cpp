@@ -11,6 +11,10 @@ namespace stemvo {
 namespace {
 
 constexpr std::size_t kMinKeyframes = 3;
+/// A road that is not proven yet scales a map in so many frames, in which one is: later the path
+/// would change its unit for what may be a table.
+constexpr int kMaxGuessed = 10;
+constexpr double kNewLogScale = 0.1;
 constexpr double kTrack_px = 0.7;  ///< error of a track over the window
 
 }  // namespace
@@ -33,6 +37,8 @@ void MetricScale::restart(const RoadImage* road, double time_s, bool has_scale) 
   }
   if (!has_scale) {
     filter_.restart();
+    is_scale_proven_ = false;
+    num_frames_ = 0;
   }
   is_road_believed_ = false;
   is_way_measured_ = false;
@@ -75,7 +81,12 @@ double MetricScale::measure(const RoadImage* road,
   state_ = is_measured || is_way_measured          ? ScaleState::kMeasured
            : is_road_believed_ || is_way_measured_ ? ScaleState::kHeld
                                                    : ScaleState::kNone;
-  if (!filter_.is_initialized()) {
+  ++num_frames_;
+  const bool is_proven = is_scale_proven_ || is_road_believed_ || is_way_measured_;
+  is_scale_new_ = is_proven && !is_scale_proven_ && num_frames_ > kMaxGuessed &&
+                  std::abs(filter_.log_scale()) > kNewLogScale;
+  is_scale_proven_ = is_proven;
+  if (!filter_.is_initialized() || (!is_proven && num_frames_ > kMaxGuessed)) {
     return 1.0;
   }
   const double metres_per_unit = std::exp(filter_.log_scale());

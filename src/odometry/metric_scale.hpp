@@ -35,6 +35,7 @@ class MetricScale {
   void restart(const RoadImage* road, double time_s, bool has_scale = false);
   /// Ways that came before this frame did.
   void add(const std::vector<Way>& ways) {
+    is_scale_new_ = false;
     ways_.add(ways);
     if (!ways.empty() && !is_enabled()) {
       state_ = ScaleState::kNone;
@@ -74,6 +75,7 @@ class MetricScale {
   void report(FrameResult& result) const {
     result.scale_state = state_;
     result.road_reason = reason_;
+    result.is_scale_new = result.is_scale_new || is_scale_new_;
     if (is_enabled()) {
       result.scale_sigma = is_way_measured_    ? filter_.sigma()
                            : is_road_believed_ ? road_->sigma(filter_)
@@ -89,6 +91,9 @@ class MetricScale {
   bool has_ways_ = false;
   bool is_road_believed_ = false;
   bool is_way_measured_ = false;  ///< since the last restart
+  bool is_scale_proven_ = false;  ///< the road was believed, or a way measured, since then
+  bool is_scale_new_ = false;     ///< with this frame, in the middle of a map
+  int num_frames_ = 0;            ///< measured on since then
   ScaleState state_ = ScaleState::kDisabled;
   std::string_view reason_;  ///< of the road
 };

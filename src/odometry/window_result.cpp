@@ -73,11 +73,11 @@ void WindowEstimator::take_in(const Recognition& recognition) {
 
 /// All but what localize() told.
 void WindowEstimator::describe(const Frame& frame, FrameResult& result) {
-  scale_.report(result);
   result.camera = camera();
   result.camera_sigma = calibration_.camera_sigma();
   result.world_from_camera = world_from_camera_;
   result.is_scale_new = is_localized(frame) && result.state == FrameState::kInitializing;
+  scale_.report(result);
   const bool has_position = !is_initializing_ || (result.state != FrameState::kInitializing &&
                                                   result.state != FrameState::kLowParallax);
   result.is_measured = is_measured(result.state) && has_position;

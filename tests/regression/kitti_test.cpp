@@ -88,6 +88,8 @@ TEST_F(HandHeld, ARoomHasNoRoad) {
                             folder_ / "result", "--quiet", "--frames", "0:150", "--set",
                             "scale.source=camera_height", "--set", "scale.camera_height_m=1.5"}));
   EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
+  const auto metrics = nlohmann::json::parse(read_file(folder_ / "result/metrics.json"));
+  EXPECT_LE(metrics["ate_rmse_m"]["sim3"], 0.03) << "one unit";
 }
 
 }  // namespace

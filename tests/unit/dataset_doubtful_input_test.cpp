@@ -213,7 +213,13 @@ TEST_F(DoubtfulInput, PairsOfCamerasBehindTheNumberCopiesAndAMaskAreNoFrames) {
   fs::remove_all(temp_ / "drive");
   const auto masked = open_source(write_images({"1.png", "2.png", "3.png", "mask.png"}));
   EXPECT_THAT(masked->warnings, ElementsAre(HasSubstr("mask.png: has no number")));
+  fs::remove_all(temp_ / "drive");
+  EXPECT_THAT(error_of(write_images({"left1700000013.png", "left1700000023.png",
+                                     "right1700000014.png", "right1700000024.png"})),
+              AllOf(HasSubstr("right1700000014.png"), HasSubstr("/left*.png'")));
   for (const auto& one_camera : std::vector<std::vector<std::string>>{
+           {"1700000001_033333333.png", "1700000001_066666666.png", "1700000002_000000000.png",
+            "1700000002_033333333.png"},
            {"cam0_frame1.png", "cam0_frame2.png", "cam0_frame3.png"},
            {"img (1).png", "img (2).png", "img (3).png"},
            {"12h30m08s1.png", "12h30m08s2.png", "12h30m09s1.png", "12h30m09s2.png",

@@ -107,6 +107,12 @@ TEST(AlignPositions, NoSmallChangeFitsNoisyPointsBetter) {
   }
 }
 
+TEST(AlignPositions, APathTheOtherWayKeepsToTheSizeOfTheTrueOne) {
+  const Points source = {{0, 0, 0}, {0, 0, -100}, {0, 0, -200}};
+  const Points target = {{0, 0, 0}, {0, 0, 1}, {0, 0, 2}};
+  EXPECT_NEAR(align_positions(source, target, Alignment::kScale).scale, 0.01, 1e-12);
+}
+
 TEST(AlignPositions, AMirrorImageIsNotMirroredBack) {
   SceneRandom random(3);
   const Points source = random_points(random, 30);
