@@ -88,6 +88,7 @@ tests=$([[ ${1:-} != test ]] || echo "${2:-}")
 cmake -G Ninja -B "$BUILD" --toolchain cmake/arm64.cmake -D CMAKE_BUILD_TYPE=Release -D ONNXRUNTIME_ROOT=/opt/onnxruntime \
   -D "STEMVO_UNIT_TESTS=${tests:-features_*_test.cpp;unit/geometry_*_test.cpp;unit/stem_*}" -D CMAKE_SKIP_INSTALL_ALL_DEPENDENCY=ON --log-level=WARNING >build/setup/configure-arm64.log 2>&1 || { cat build/setup/configure-arm64.log && exit 1; }
 cmake --build "$BUILD" --parallel "$(nproc)" --target stemvo_app stemvo_video
+rm -f "$BUILD"/stemvo_*.deb
 (cd "$BUILD" && cpack -G DEB -D CPACK_DEBIAN_PACKAGE_ARCHITECTURE=arm64 -D CPACK_DEBIAN_PACKAGE_SHLIBDEPS=OFF \
   -D "CPACK_DEBIAN_PACKAGE_DEPENDS=$(cd - >/dev/null && packages_of_libraries)" >cpack.log) || { cat "$BUILD/cpack.log" && exit 1; }
 [[ ${1:-} != wheel ]] || make_wheel "$2"
@@ -96,7 +97,8 @@ cmake --build "$BUILD" --parallel "$(nproc)" --target stemvo_app stemvo_video
 cmake --build "$BUILD" --parallel "$(nproc)" --target stemvo_unit_tests
 # A test starts the writer of videos; the emulator passes that on to this machine, so that it must be this machine's.
 cp build/release/tests/stemvo_write_video "$BUILD/tests/"
-ctest --test-dir "$BUILD" --label-regex unit --exclude-regex portable --timeout 3000 --parallel "$(nproc)" --output-on-failure
+# Ceres' part of this one takes two minutes under the emulator.
+GTEST_FILTER=-Bundle.EndsWhereCeresDoes ctest --test-dir "$BUILD" --label-regex unit --exclude-regex portable --timeout 3000 --parallel "$(nproc)" --output-on-failure
 readonly INSTALLED=build/arm64-installed
 unpack "$INSTALLED" "$PWD"/"$BUILD"/stemvo_*_arm64.deb
 finish_root "$INSTALLED"
