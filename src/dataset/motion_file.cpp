@@ -27,7 +27,7 @@ Status check_unit(const std::filesystem::path& file, const char* other, const ch
   const std::regex name(other, std::regex::icase);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     std::smatch found;
-    if (std::regex_search(lines[i], found, name)) {
+    if (std::regex_search(lines[i], found, name) && lines[i].find(expected) == std::string::npos) {
       return fail_at(file, i, fail(fmt::format("expected {}, found {}", expected, found.str())));
     }
   }
