@@ -14,7 +14,7 @@ constexpr std::size_t kMinKeyframes = 3;
 /// A road that is not proven yet scales a map in so many frames, in which one is: later the path
 /// would change its unit for what may be a table.
 constexpr int kMaxGuessed = 10;
-constexpr double kNewLogScale = 0.1;
+constexpr double kNewLogScale = 0.1;  ///< a unit that changes by more is another one
 constexpr double kTrack_px = 0.7;  ///< error of a track over the window
 
 }  // namespace

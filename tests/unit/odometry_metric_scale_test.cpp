@@ -168,7 +168,7 @@ TEST(MetricScale, LandmarksAreInTheUnitsOfTheirPoseWhenTheFirstRoadComes) {
     ++(is_metric ? num_after : num_before);
   }
   EXPECT_GT(num_before, 20);
-  EXPECT_GT(num_after, 50);
+  EXPECT_GT(num_after, 80);
 }
 
 TEST(MetricScale, AFrameWithoutARoadImageKeepsTheUnit) {
