@@ -15,7 +15,7 @@ constexpr std::size_t kMinKeyframes = 3;
 /// would change its unit for what may be a table.
 constexpr int kMaxGuessed = 10;
 constexpr double kNewLogScale = 0.1;  ///< a unit that changes by more is another one
-constexpr double kTrack_px = 0.7;  ///< error of a track over the window
+constexpr double kTrack_px = 0.7;     ///< error of a track over the window
 
 }  // namespace
 
