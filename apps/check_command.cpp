@@ -73,12 +73,12 @@ Expected<int> check(CheckArguments& arguments) {
 
 void add_options(CLI::App& command, CheckArguments& arguments) {
   CheckRequest& request = arguments.request;
-  command.add_option("METRICS.json", request.metrics, "metrics.json of a run")
+  command.add_option("METRICS.json", request.metrics, "metrics.json of a run, or its folder")
       ->required()
       ->type_name("");
   add_file_option(command, "--against", request.thresholds, "Thresholds to hold it against");
   add_file_option(command, "--baseline", request.baseline,
-                  "metrics.json of an earlier run, none of whose errors may grow");
+                  "That of an earlier run, none of whose errors may grow");
   command
       .add_option_function<std::string>(
           "--tolerance",

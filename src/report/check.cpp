@@ -87,6 +87,12 @@ const Json* find_metric(const Json& root, const std::string& key) {
   return node;
 }
 
+/// The result's folder stands for its metrics.json.
+std::filesystem::path metrics_file(const std::filesystem::path& given) {
+  std::error_code none;
+  return std::filesystem::is_directory(given, none) ? given / "metrics.json" : given;
+}
+
 Expected<std::vector<ThresholdResult>> read_baseline(const std::filesystem::path& file,
                                                      double tolerance,
                                                      const Json& metrics) {
@@ -171,9 +177,10 @@ Expected<std::vector<ThresholdResult>> check_metrics(const CheckRequest& request
   if (request.thresholds) {
     STEMVO_TRY_GET(results, read_thresholds(*request.thresholds));
   }
-  STEMVO_TRY_GET(const Json metrics, read_json_object(request.metrics));
+  STEMVO_TRY_GET(const Json metrics, read_json_object(metrics_file(request.metrics)));
   if (request.baseline) {
-    STEMVO_TRY_GET(const auto bounds, read_baseline(*request.baseline, request.tolerance, metrics));
+    STEMVO_TRY_GET(const auto bounds,
+                   read_baseline(metrics_file(*request.baseline), request.tolerance, metrics));
     results.insert(results.end(), bounds.begin(), bounds.end());
   }
   for (ThresholdResult& result : results) {

@@ -12,9 +12,9 @@ namespace stemvo {
 
 /// A metrics.json and what it is held against; at least one of the two files.
 struct CheckRequest {
-  std::filesystem::path metrics;
+  std::filesystem::path metrics;  ///< metrics.json of a run, or the run's folder
   std::optional<std::filesystem::path> thresholds;
-  std::optional<std::filesystem::path> baseline;  ///< the metrics.json of an earlier run
+  std::optional<std::filesystem::path> baseline;  ///< those of an earlier run
   double tolerance = 0.05;                        ///< share of the baseline's number
 };
 

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "dataset/frame_files.hpp"
+#include "evaluation/conventions.hpp"
 #include "report/metrics_json.hpp"
 #include "text/text_table.hpp"
 #include "try.hpp"
@@ -64,6 +65,9 @@ nlohmann::ordered_json row_json(const EvaluationRow& row) {
   json["file"] = row.name;
   json["compared_poses"] = row.num_pairs;
   add_metrics(json, row.metrics);
+  if (row.doubt) {
+    json["warning"] = *row.doubt;
+  }
   return json;
 }
 
@@ -91,7 +95,8 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
       return fail(file.string() + ": expected at least 2 poses, for motions are compared, found 1");
     }
     report.rows.push_back({file.string(), evaluate_aligned(compared, with, request.alignment),
-                           estimate.poses.size(), compared.size()});
+                           estimate.poses.size(), compared.size(),
+                           other_convention(compared, with)});
   }
   // No alignment: a fit would move the whole heap of points into the middle of the drive.
   report.zero_motion = {"(zero motion)", evaluate(Trajectory(truth.poses.size()), truth.poses),
@@ -119,11 +124,18 @@ std::string format_evaluation_table(const EvaluationReport& report) {
           : fmt::format("t_rel and r_rel: mean over {} segments of {}",
                         few == many ? std::to_string(few) : fmt::format("{} to {}", few, many),
                         length_range(least.metrics.segment_lengths_m));
-  std::string unmatched;
+  std::string notes;
   for (const EvaluationRow& row : report.rows) {
     if (row.num_pairs < row.num_poses) {
-      unmatched += fmt::format("{}: {} of {} poses have no true pose of their time\n", row.name,
-                               row.num_poses - row.num_pairs, row.num_poses);
+      notes += fmt::format("{}: {} of {} poses have no true pose of their time\n", row.name,
+                           row.num_poses - row.num_pairs, row.num_poses);
+    }
+    if (row.num_pairs < report.num_poses) {
+      notes += fmt::format("{}: a pose for {} of {} true ones: steps are those between them\n",
+                           row.name, row.num_pairs, report.num_poses);
+    }
+    if (row.doubt) {
+      notes += fmt::format("warning: {}: {}\n", row.name, *row.doubt);
     }
   }
   return fmt::format(
@@ -131,7 +143,7 @@ std::string format_evaluation_table(const EvaluationReport& report) {
       "offset: mean of |dx| + |dz|; ATE: root mean square position error; RPE: mean error of "
       "the step of one frame\n{}",
       report.ground_truth, report.num_poses, zero_motion.path_length_m, to_string(report.alignment),
-      table.str(), segments, unmatched);
+      table.str(), segments, notes);
 }
 
 nlohmann::ordered_json evaluation_document(const EvaluationReport& report) {

@@ -30,8 +30,9 @@ struct EvaluationRequest {
 struct EvaluationRow {
   std::string name;  ///< the path as given, or "(zero motion)"
   Metrics metrics;
-  std::size_t num_poses = 0;  ///< in the file
-  std::size_t num_pairs = 0;  ///< poses that were compared with a true one
+  std::size_t num_poses = 0;                        ///< in the file
+  std::size_t num_pairs = 0;                        ///< poses that were compared with a true one
+  std::optional<std::string> doubt = std::nullopt;  ///< what other_convention says
 };
 
 struct EvaluationReport {

@@ -38,6 +38,13 @@ Expected<std::vector<ThresholdResult>> compare(const std::string& metrics,
                         folder.file("baseline.json", baseline), tolerance});
 }
 
+TEST(Check, ARunsFolderStandsForItsMetrics) {
+  const TempFolder folder;
+  folder.file("metrics.json", kMetrics);
+  const auto results = check_metrics({folder.path(), std::nullopt, folder.path()});
+  EXPECT_TRUE(results && all_passed(*results));
+}
+
 TEST(Check, PassesWhatIsWithinItsBounds) {
   const auto results = check(
       "# a comment\n"

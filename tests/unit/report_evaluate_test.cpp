@@ -128,10 +128,41 @@ TEST(EvaluateFiles, FilesWithTimesAreMatchedByTime) {
   EXPECT_LT(report->rows[0].metrics.ate_rmse.none_m, 1e-6);
   EXPECT_THAT(format_evaluation_table(*report),
               HasSubstr("estimate_tum.txt: 1 of 151 poses have no true pose of their time\n"));
+  EXPECT_THAT(format_evaluation_table(*report),
+              HasSubstr("a pose for 150 of 300 true ones: steps are those between them\n"));
   request.tolerance_s = 0.003;
   const auto none = evaluate_files(request);
   EXPECT_THAT(none.error().message, HasSubstr("at least 2 poses within 0.003 s"));
   EXPECT_THAT(none.error().message, HasSubstr("0.000 to 29.900 s, the others of 0.104 to 99.000"));
+}
+
+TEST(EvaluateFiles, PosesOfAnotherConventionAreNamed) {
+  const Files files;
+  const auto doubt_of = [&](const auto& convert) {
+    Trajectory poses = circle(300, 0.5);  // in units
+    std::ranges::transform(poses, poses.begin(), convert);
+    EXPECT_TRUE(write_kitti_trajectory(files.kitti, poses));
+    return evaluate_files({files.truth, {files.kitti}})->rows[0].doubt.value_or("none");
+  };
+  const auto of_axes = [](const Eigen::Matrix3d& axes_from_camera) {
+    const Rigid3 turn = Rigid3::from_matrix(axes_from_camera, {0, 0, 0});
+    return [turn](const Rigid3& pose) { return Rigid3(turn * pose * turn.inverse()); };
+  };
+  const Eigen::Matrix3d robot{{0, 0, 1}, {-1, 0, 0}, {0, -1, 0}};
+  const Eigen::Matrix3d opengl{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
+  EXPECT_EQ(doubt_of([](const Rigid3& pose) { return pose; }), "none");
+  EXPECT_EQ(doubt_of([](const Rigid3&) { return Rigid3(); }), "none");
+  EXPECT_THAT(doubt_of([](const Rigid3& pose) { return pose.inverse(); }),
+              HasSubstr("camera_from_world"));
+  EXPECT_THAT(doubt_of(of_axes(robot)), HasSubstr("x forward, y left, z up"));
+  EXPECT_THAT(doubt_of(of_axes(opengl)), HasSubstr("x right, y up, z backward"));
+  EXPECT_THAT(doubt_of([](const Rigid3& pose) {
+                const auto& q = pose.rotation;  // as a file's x y z w are where w is written first
+                return Rigid3(Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()), pose.translation);
+              }),
+              HasSubstr("w first"));
+  EXPECT_THAT(format_evaluation_table(*evaluate_files({files.truth, {files.kitti}})),
+              HasSubstr("warning: "));
 }
 
 TEST(EvaluateFiles, TheTruthOfEurocIsTheBodys) {

@@ -52,6 +52,7 @@ IN_PLACE_OF = [
     (r"\bsynth (.*?)--frames \d+", rf"synth \1--width 620 --height 188 --frames {FRAMES}"),
     (r"for i in 1 2 3;", "for i in 1;"),
     (r"\{street,walk\}\{1,2,3\} --objective landing", "{street,walk}1 --objective landing --steps 2"),
+    (r"(stemvo-lab robustness (?!.*--kinds).*?) --out", r"\1 --kinds none,rain --out"),
     (r"--calib refined.txt", "--calib KITTI/sequences/00/calib.txt"),
     (r"( --model stems/(efficientnetv2b0|mobilenet025|resnet18)\.onnx){3}", ""),
     (r"--model (M\b|stems/efficientnetv2b0.onnx)", "--model default"),
