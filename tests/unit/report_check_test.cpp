@@ -40,9 +40,10 @@ Expected<std::vector<ThresholdResult>> compare(const std::string& metrics,
 
 TEST(Check, ARunsFolderStandsForItsMetrics) {
   const TempFolder folder;
-  folder.file("metrics.json", kMetrics);
-  const auto results = check_metrics({folder.path(), std::nullopt, folder.path()});
-  EXPECT_TRUE(results && all_passed(*results));
+  for (const auto& baseline : {folder.file("metrics.json", kMetrics), folder.path()}) {
+    const auto results = check_metrics({folder.path(), std::nullopt, baseline});
+    EXPECT_TRUE(results && all_passed(*results));
+  }
 }
 
 TEST(Check, PassesWhatIsWithinItsBounds) {
