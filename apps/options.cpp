@@ -101,7 +101,10 @@ CLI::Option* add_file_option(CLI::App& command,
                              const std::string& name,
                              std::optional<std::filesystem::path>& file,
                              const std::string& help) {
-  const auto take = [&file](const std::string& text) {
+  const auto take = [&file, name](const std::string& text) {
+    if (text.starts_with("--")) {
+      throw CLI::ValidationError(name, "expected a file, found " + text);
+    }
     if (!text.empty()) {
       file = text;
     }

@@ -10,7 +10,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calibration/board.hpp"
+#include "geometry/degrees.hpp"
 #include "geometry/median.hpp"
+#include "odometry/check_frame.hpp"
 #include "report/frame_image.hpp"
 
 namespace stemvo {
@@ -69,12 +71,44 @@ BoardView* find_odd(const std::vector<BoardView*>& views) {
   return views.size() > kMinViews && worst->error_px > limit_px ? worst : nullptr;
 }
 
-/// No camera sees a board that was named wrong. Error: this one is.
-Expected<BoardFit> check_fit(const BoardFit& fit, const cv::Size& size) {
+/// The largest angle between two of the boards' normals, about: rad.
+double spread_of_tilts(const std::vector<BoardView*>& views) {
+  const cv::Vec3d least(-1.0, -1.0, -1.0);
+  cv::Vec3d low = -least;
+  cv::Vec3d high = least;
+  for (const BoardView* view : views) {
+    cv::Matx33d rotation;
+    cv::Rodrigues(view->camera_from_board_r, rotation);
+    for (int i = 0; i < 3; ++i) {
+      low[i] = std::min(low[i], rotation(i, 2));
+      high[i] = std::max(high[i], rotation(i, 2));
+    }
+  }
+  return cv::norm(high - low);
+}
+
+/// No camera sees a board that was named wrong; boards that are all parallel tell none, whatever
+/// the sigmas of what was fitted. Error: these do not.
+Expected<BoardFit> check_fit(const BoardFit& fit,
+                             const cv::Size& size,
+                             const std::vector<BoardView*>& views) {
   constexpr double kMaxError = 0.003;  // of the image's width
+  constexpr double kMinTilts_rad = 0.1;
+  constexpr double kMaxRatio = 1.5;  // of pixels' sides
   const bool is_finite = std::ranges::all_of(fit.numbers, [](const FittedNumber& number) {
     return std::isfinite(number.value) && std::isfinite(number.sigma);
   });
+  const double ratio = fit.camera.fx_px / fit.camera.fy_px;
+  const Status camera = check_camera(fit.camera);
+  const double tilts_rad = spread_of_tilts(views);
+  if (!(tilts_rad > kMinTilts_rad) || std::max(ratio, 1.0 / ratio) > kMaxRatio || !camera) {
+    return fail(
+        fmt::format("expected boards of different tilts, by 20 to 45 degrees, found ones "
+                    "that tell no camera: tilts differ by {:.1f} degrees, fx {:.4g}, fy "
+                    "{:.4g}{}",
+                    kDegPerRad * tilts_rad, fit.camera.fx_px, fit.camera.fy_px,
+                    camera ? "" : ", " + camera.error().message));
+  }
   if (!is_finite || !(fit.error_px <= kMaxError * size.width)) {
     return fail(fmt::format(
         "expected corners within {:.1f} px of where a camera sees the board's, found {:.1f} px: "
@@ -178,7 +212,7 @@ Expected<BoardFit> fit_camera(std::vector<BoardView>& views, const cv::Size& siz
                !(std::abs(fit->numbers.back().value) > kMinSigmas * fit->numbers.back().sigma)) {
       has_k3 = false;
     } else {
-      return fit ? check_fit(*fit, size) : fit;
+      return fit ? check_fit(*fit, size, used) : fit;
     }
   }
 }

@@ -91,25 +91,43 @@ Expected<Listing> list_own(const fs::path& folder) {
 
 constexpr std::string_view kDigitCharacters = "0123456789";
 
+bool is_digit(char c) { return kDigitCharacters.find(c) != std::string_view::npos; }
+
 /// Each whole number becomes '0', the number of its digits without leading zeros, and these
-/// digits: compared as text, it is compared by its value.
-std::string sort_key(std::string_view name) {
+/// digits: compared as text, it is compared by its value. With `has_decimals` digits behind "7."
+/// are its decimals.
+std::string sort_key(std::string_view name, bool has_decimals) {
   std::string key;
+  bool are_decimals = false;
   while (!name.empty()) {
     const std::size_t length = std::min(name.find_first_not_of(kDigitCharacters), name.size());
     if (length == 0) {
+      are_decimals = has_decimals && name.front() == '.' && !key.empty() && is_digit(key.back());
       key += name.front();
       name.remove_prefix(1);
       continue;
     }
     std::string_view number = name.substr(0, length);
-    number.remove_prefix(std::min(number.find_first_not_of('0'), length));
-    key += '0';
-    key += static_cast<char>(number.size());  // names have at most 255 characters
-    key += number;
+    if (are_decimals) {
+      key += std::string(number) + '\0';
+    } else {
+      number.remove_prefix(std::min(number.find_first_not_of('0'), length));
+      key += '0';
+      key += static_cast<char>(number.size());  // names have at most 255 characters
+      key += number;
+    }
+    are_decimals = false;
     name.remove_prefix(length);
   }
   return key;
+}
+
+/// Seconds whose last zeros were left out ("5.25", "5.3"): of frames that are counted ("1.9",
+/// "1.10") some end with one.
+bool have_decimals(const std::vector<fs::path>& files) {
+  static const std::regex kZero(".*[0-9]\\.[0-9]+0([^0-9].*)?");
+  return std::ranges::none_of(
+      files, [](const fs::path& file) { return std::regex_match(file.stem().string(), kZero); });
 }
 
 /// "_left" of "left_*.png"; nothing of "*.png", which is all of a folder.
@@ -126,7 +144,9 @@ std::string numbers_of(const fs::path& file) {
   std::string numbers;
   for (std::size_t i = stem.find_first_of(kDigitCharacters); i < stem.size();) {
     const std::size_t end = std::min(stem.find_first_not_of(kDigitCharacters, i), stem.size());
-    i = std::min(stem.find_first_not_of('0', i), end - 1);  // a zero alone stays
+    if (i < 2 || stem[i - 1] != '.' || !is_digit(stem[i - 2])) {  // else decimals
+      i = std::min(stem.find_first_not_of('0', i), end - 1);      // a zero alone stays
+    }
     numbers += stem.substr(i, end - i) + ' ';
     i = stem.find_first_of(kDigitCharacters, end);
   }
@@ -192,7 +212,9 @@ bool are_seconds(const std::string& before, const std::set<std::string>& numbers
 /// ("7 (1).png").
 Status check_names(const std::vector<fs::path>& files, const fs::path& given) {
   static const std::regex kCopy("(.+?)( \\([0-9]+\\)|[ _-]+[Cc]opy.*)");
-  static const std::regex kCamera("(.*[0-9][^0-9]*?)([_-]?[A-Za-z]{2,}[_-]?[0-9])");
+  static const std::regex kCamera(
+      "(.*[0-9][^0-9]*?)([_-]?[A-Za-z]{2,}[_-]?[0-9]|[_.-][A-Za-z]?[0-9]{1,2})");
+  constexpr std::size_t kMaxCameras = 6;  // more numbers are those of frames
   std::set<std::string> stems;
   std::set<std::string> moments;
   std::set<std::string> cameras;
@@ -212,7 +234,7 @@ Status check_names(const std::vector<fs::path>& files, const fs::path& given) {
   };
   constexpr double kMost = 0.9;  // some frames may be missing
   const auto num_pairs = static_cast<double>(moments.size() * cameras.size());
-  if (cameras.size() > 1 && moments.size() > cameras.size() &&
+  if (cameras.size() > 1 && cameras.size() <= kMaxCameras && moments.size() > cameras.size() &&
       static_cast<double>(files.size()) > kMost * num_pairs) {
     return fail_of(files[1], *cameras.begin());
   }
@@ -238,6 +260,26 @@ std::string warn_of_names(const std::vector<fs::path>& files) {
 std::string letters_of(std::string name) {
   std::erase_if(name, [](unsigned char c) { return std::isdigit(c) != 0; });
   return name;
+}
+
+/// About as many of each, over much of the same span.
+bool are_of_one_time(const std::set<std::string>& a, const std::set<std::string>& b) {
+  constexpr std::size_t kMin = 3;
+  constexpr double kAlike = 0.8;
+  const auto span_of = [](const std::set<std::string>& numbers) {
+    std::vector<double> values;
+    for (const std::string& number : numbers) {
+      values.push_back(std::strtod(number.c_str(), nullptr));
+    }
+    const auto [first, last] = std::ranges::minmax(values);
+    return std::pair(first, last);
+  };
+  const auto [first_a, last_a] = span_of(a);
+  const auto [first_b, last_b] = span_of(b);
+  const auto [fewer, more] = std::minmax(a.size(), b.size());
+  return fewer >= kMin && static_cast<double>(fewer) >= kAlike * static_cast<double>(more) &&
+         std::min(last_a, last_b) - std::max(first_a, first_b) >
+             kAlike * std::max(last_a - first_a, last_b - first_b);
 }
 
 /// Error: two images of one number, which are two cameras or one picture twice; or names with the
@@ -271,13 +313,12 @@ Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) 
       return one_time(given, firsts[0], firsts[1]);
     }
   }
-  // Cameras whose time stamps are their own, but of one time.
-  constexpr std::size_t kStampDigits = 9;
+  // Cameras whose numbers are their own, but of one time.
   for (auto b = groups.begin(), a = b; b != groups.end(); a = b++) {
-    const auto& [early, late] = std::tie(a->second.numbers, b->second.numbers);
-    if (a != b && early.begin()->size() >= kStampDigits && *early.begin() < *late.rbegin() &&
-        *late.begin() < *early.rbegin() &&
-        letters_of(a->first.first) != letters_of(b->first.first)) {
+    if (a != b &&
+        letters_of(a->first.first + a->first.second) !=
+            letters_of(b->first.first + b->first.second) &&
+        are_of_one_time(a->second.numbers, b->second.numbers)) {
       return one_time(given, a->second.first, b->second.first);
     }
   }
@@ -306,8 +347,9 @@ std::optional<Expected<Listing>> find_listing(const fs::path& folder) {
   return is_ours ? std::optional(list_own(folder)) : std::nullopt;
 }
 
-bool comes_before(std::string_view a, std::string_view b) {
-  return std::make_tuple(sort_key(a), a) < std::make_tuple(sort_key(b), b);
+bool comes_before(std::string_view a, std::string_view b, bool has_decimals) {
+  return std::make_tuple(sort_key(a, has_decimals), a) <
+         std::make_tuple(sort_key(b, has_decimals), b);
 }
 
 bool matches_pattern(const std::string& name, const std::string& pattern) {
@@ -351,8 +393,9 @@ Expected<Listing> list_images(const fs::path& given) {
     return fail(fmt::format("{}: expected images (.png, .jpg, .jpeg), found none; check the path",
                             given.string()));
   }
-  std::sort(result.files.begin(), result.files.end(), [](const fs::path& a, const fs::path& b) {
-    return comes_before(a.filename().string(), b.filename().string());
+  const bool has_decimals = have_decimals(result.files);
+  std::ranges::sort(result.files, [&](const fs::path& a, const fs::path& b) {
+    return comes_before(a.filename().string(), b.filename().string(), has_decimals);
   });
   Status single = check_numbers(result.files, given);
   if (single = single ? check_names(result.files, given) : single; !single) {

@@ -21,13 +21,16 @@ Expected<std::vector<double>> numbers_of(const TimedRow& row, const std::filesys
   return numbers ? numbers : fail_at(file, row.line, numbers.error());
 }
 
-/// Error: a comment of the file names a unit that its numbers are not read in.
-Status check_unit(const std::filesystem::path& file, const char* other, const char* expected) {
+/// Error: a comment of the file names a unit that its numbers are not read in, and not theirs.
+Status check_unit(const std::filesystem::path& file,
+                  const char* other,
+                  const std::string& expected) {
   STEMVO_TRY_GET(const auto lines, read_lines(file));
   const std::regex name(other, std::regex::icase);
+  const std::regex own("(^|[^a-z])" + expected, std::regex::icase);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     std::smatch found;
-    if (std::regex_search(lines[i], found, name) && lines[i].find(expected) == std::string::npos) {
+    if (std::regex_search(lines[i], found, name) && !std::regex_search(lines[i], own)) {
       return fail_at(file, i, fail(fmt::format("expected {}, found {}", expected, found.str())));
     }
   }
@@ -51,7 +54,7 @@ Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file,
                                           const std::optional<std::pair<double, double>>& span_s) {
   constexpr double kSigmaShare = 0.02;
   constexpr double kMinSigma = 0.05;
-  STEMVO_TRY(check_unit(file, "km/?h|kph|mph|knots", "m/s"));
+  STEMVO_TRY(check_unit(file, "km *(/|p|h)|kilomet|kph|mph|knots|miles|[cm]m */ *s", "m/s"));
   STEMVO_TRY_GET(const auto found, read_timed_rows(file, {2, 3}, "a time, m/s and maybe a sigma",
                                                    {.span_s = span_s}));
   TimedRows<SpeedRow> speeds{.rows = {}, .note = found.note};
@@ -71,7 +74,7 @@ Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file,
 Expected<TimedRows<GyroRow>> read_gyro(const std::filesystem::path& file,
                                        const std::optional<std::pair<double, double>>& span_s) {
   constexpr double kMinStep_s = 0.9e-4;
-  STEMVO_TRY(check_unit(file, "deg[a-z]*(/|_per_)s|dps", "rad/s"));
+  STEMVO_TRY(check_unit(file, "deg|dps|\xC2\xB0", "rad/s"));
   STEMVO_TRY_GET(
       const auto found,
       read_timed_rows(file, {4, 7}, "a time and rad/s about x, y and z",

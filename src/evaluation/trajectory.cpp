@@ -2,10 +2,12 @@
 #include "evaluation/trajectory.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <numeric>
 #include <optional>
+#include <regex>
 #include <string>
 #include <string_view>
 
@@ -51,11 +53,25 @@ std::optional<Format> format_of_commas(std::string_view row, bool says_nanosecon
   return Format::kEuroc;
 }
 
+/// Names that end with w, x, y, z in this order ("qw qx ..", "orientation.w orientation.x ..", "w x
+/// y z"), or are counted, whose first is w in most programs.
 bool names_w_first(std::string_view comment) {
-  constexpr std::string_view kNames[][2] = {{"qw", "qx"}, {"q_w", "q_x"}, {"q_RS_w", "q_RS_x"}};
-  return std::ranges::any_of(kNames, [comment](const auto& names) {
-    return comment.find(names[0]) < comment.find(names[1]);  // none is the largest number
-  });
+  std::string axes;
+  std::string name;
+  for (const char c : std::string(comment) + ' ') {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
+      name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+      continue;
+    }
+    if (name == "q0") {
+      return true;
+    }
+    const bool is_axis = name.size() == 1 || (name.size() == 2 && name.front() == 'q');
+    axes += is_axis ? name.back() : ' ';
+    name.clear();
+  }
+  static const std::regex kOrder("w[ q]{0,2}x[ q]{0,2}y[ q]{0,2}z");
+  return std::regex_search(axes, kOrder);
 }
 
 /// Nullopt: the numbers may be of two formats, or a comment says another order.

@@ -234,7 +234,8 @@ void Mapper::keep_last_view(const WindowView& view) {
 std::optional<Relocation> Mapper::locate(const WindowView& view,
                                          const Matches& matches,
                                          const ImagePyramid& image,
-                                         const Rigid3& predicted) {
+                                         const Rigid3& predicted,
+                                         const PoseByLandmarks& pose_of) {
   finish_lookup();
   if (!is_on_) {
     return std::nullopt;
@@ -256,8 +257,13 @@ std::optional<Relocation> Mapper::locate(const WindowView& view,
   }
   const Similarity3& map_from_old = keeper_.map().pose(found->keyframe);
   if (!keeper_.has_own(keeper_.component_of(found->keyframe))) {
-    const Similarity3 map_from_camera = map_from_old * Similarity3(found->keyframe_from_camera);
-    keeper_.correct(map_from_camera * Similarity3(predicted).inverse());
+    // In the map's unit: that of a single keyframe, above all of the first ones, may be off.
+    const Rigid3 map_from_camera = map_from_old * found->keyframe_from_camera;
+    std::map<int, Eigen::Vector3d> in_camera;
+    for (const auto& [track_id, in_old] : found->landmarks) {
+      in_camera.emplace(track_id, map_from_camera.inverse() * (map_from_old * in_old));
+    }
+    keeper_.correct(Similarity3(map_from_camera * pose_of(in_camera).inverse()));
   }
   const Similarity3 world_from_old = keeper_.map_from_world().inverse() * map_from_old;
   Relocation relocation{

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <future>
 #include <map>
 #include <memory>
@@ -63,13 +64,16 @@ class Mapper {
   /// relocation.
   void close(const WindowView& view);
 
-  /// A frame without a pose, or in no map yet; nullopt: it shows no kept place. `predicted`,
-  /// world_from_camera, is what it has where the map is all of another recording: that one comes
+  /// A frame's world_from_camera, by landmarks in its camera.
+  using PoseByLandmarks = std::function<Rigid3(const std::map<int, Eigen::Vector3d>&)>;
+  /// A frame without a pose, or in no map yet; nullopt: it shows no kept place. `predicted` is what
+  /// it has, `pose_of` tells where it is in a map that is all of another recording: that one comes
   /// to this world.
   [[nodiscard]] std::optional<Relocation> locate(const WindowView& view,
                                                  const Matches& matches,
                                                  const ImagePyramid& image,
-                                                 const Rigid3& predicted);
+                                                 const Rigid3& predicted,
+                                                 const PoseByLandmarks& pose_of);
   /// The next frame tells whether the one that locate() was asked for shows a place.
   [[nodiscard]] bool may_be_locating() const { return recognizer_.may_be_locating(); }
   /// The next window begins with the frame that was located last.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -85,6 +86,9 @@ class WindowEstimator final : public Estimator {
   /// Nothing is measured: the last motion goes on.
   void go_on(const Frame& frame) { world_from_camera_ = predict(trust_.trusted(frame.hints)); }
   /// Goes on in the map where the frame shows a kept place; false: it shows none.
+  [[nodiscard]] Rigid3 pose_by_reference(const Matches& matches,
+                                         const std::map<int, Eigen::Vector3d>& in_camera,
+                                         const Rigid3& predicted) const;
   [[nodiscard]] bool relocate(const Frame& frame, const Observations& now, const Rigid3& predicted);
   FrameState measure_since_reference(const Frame& frame,
                                      const Observations& now,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -20,14 +21,33 @@ constexpr double kMaxPull_px = 2.0;
 
 }  // namespace
 
+/// The way since the reference of a map to be is known only now: its points tell where it stands.
+Rigid3 WindowEstimator::pose_by_reference(const Matches& matches,
+                                          const std::map<int, Eigen::Vector3d>& in_camera,
+                                          const Rigid3& predicted) const {
+  const View& reference = initializer_.reference();
+  const std::vector<char> all(matches.prev_uv.size(), 1);
+  const Observations points =
+      reference.points.empty() ? previous_points(matches, all) : reference.points;
+  Window place;
+  place.landmarks = in_camera;
+  const SeenLandmarks seen = find_seen_landmarks(place, points);
+  const auto cur_from_reference = stemvo::localize(seen, Rigid3(), camera(), localization_);
+  return is_initializing_ && cur_from_reference.has_value()
+             ? reference.world_from_camera * cur_from_reference->world_from_camera.inverse()
+             : predicted;
+}
+
 bool WindowEstimator::relocate(const Frame& frame,
                                const Observations& now,
                                const Rigid3& predicted) {
   if (frame.pyramid == nullptr) {
     return false;
   }
-  const std::optional<Relocation> found =
-      mapper_.locate(window_view(), frame.matches, *frame.pyramid, predicted);
+  const std::optional<Relocation> found = mapper_.locate(
+      window_view(), frame.matches, *frame.pyramid, predicted, [&](const auto& in_camera) {
+        return pose_by_reference(frame.matches, in_camera, predicted);
+      });
   if (!found.has_value()) {
     return false;
   }

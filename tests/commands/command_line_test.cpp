@@ -70,6 +70,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"run", "x", "--out", "o", "--threads", "-1"}, "--threads"},
       {{"run", "x", "--out", "o", "--threads", "1.5"}, "a whole number from 0 to 1024, found 1.5"},
       {{"run", "x", "--out", "o", "--pictures", "0"}, "--pictures"},
+      {{"run", "x", "--save-map", "--timing"}, "--save-map: expected a file, found --timing"},
       {{"evaluate", "--gt", "a"}, "ESTIMATE"},
       {{"evaluate", "--gt", "a", "b", "--align", "icp"}, "--align"},
       {{"channel", "x", "--out", "o", "--filters", "4:4"}, "A < B"},

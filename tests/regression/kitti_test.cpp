@@ -22,6 +22,24 @@ INSTANTIATE_TEST_SUITE_P(Clips,
                          ::testing::Values("00", "02", "03", "06"),
                          [](const auto& clip) { return clip.param; });
 
+class SecondVisit : public NeedsClips {};
+
+TEST_F(SecondVisit, BeginsWhereItBegan) {
+  const std::string clip = shared_data() / "kitti/sequences/06";
+  const std::string map = folder_ / "place.map";
+  const auto t_rel_percent = [&](const std::string& option, const std::string& frames) {
+    const auto done = run_stemvo(
+        {"run", clip, "--frames", frames, option, map, "--out", folder_ / "result", "--quiet"});
+    EXPECT_EQ(done.exit_code, 0) << done.err;
+    return nlohmann::json::parse(read_file(folder_ / "result/metrics.json"))
+        .at("t_rel_percent")
+        .get<double>();
+  };
+  EXPECT_LT(t_rel_percent("--save-map", "0:51"), 1.0);
+  EXPECT_LT(t_rel_percent("--map", "0:51"), 1.2) << "the steps until the place was recognized";
+  EXPECT_LT(t_rel_percent("--map", "15:51"), 1.5);
+}
+
 class RoadOfClip : public NeedsClips {
  protected:
   static constexpr int kFrames = 80;

@@ -180,6 +180,12 @@ TEST(Board, FormsAreCheckedBeforeWork) {
   }
 }
 
+TEST_F(BoardCalibration, ParallelBoardsTellNoCamera) {
+  EXPECT_THAT(message_of(try_to_calibrate("9x6:0.025", print_chessboard({9, 6}, 0.025), 12, 0.001)),
+              HasSubstr("photos: expected boards of different tilts"));
+  EXPECT_FALSE(fs::exists(temp_ / "camera.yaml"));
+}
+
 TEST_F(BoardCalibration, TooFewViewsAreRefused) {
   const fs::path photos = temp_ / "photos";
   fs::create_directories(photos);

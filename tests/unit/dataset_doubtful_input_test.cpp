@@ -217,7 +217,20 @@ TEST_F(DoubtfulInput, PairsOfCamerasBehindTheNumberCopiesAndAMaskAreNoFrames) {
   EXPECT_THAT(error_of(write_images({"left1700000013.png", "left1700000023.png",
                                      "right1700000014.png", "right1700000024.png"})),
               AllOf(HasSubstr("right1700000014.png"), HasSubstr("/left*.png'")));
+  for (const auto& two_cameras : std::vector<std::vector<std::string>>{
+           {"01_0.png", "01_1.png", "02_0.png", "02_1.png", "03_0.png", "03_1.png"},
+           {"1-c0.png", "1-c1.png", "2-c0.png", "2-c1.png", "3-c0.png", "3-c1.png"},
+           {"00001_left.png", "00004_right.png", "00051_left.png", "00054_right.png",
+            "00101_left.png", "00104_right.png"},
+           {"a_5.100.png", "b_5.103.png", "a_5.200.png", "b_5.203.png", "a_5.300.png",
+            "b_5.303.png"}}) {
+    fs::remove_all(temp_ / "drive");
+    EXPECT_THAT(error_of(write_images(two_cameras)), HasSubstr("a quoted pattern tells which"))
+        << two_cameras[0];
+  }
   for (const auto& one_camera : std::vector<std::vector<std::string>>{
+           {"5.05.png", "5.25.png", "5.3.png", "5.5.png"},
+           {"1.1.png", "1.9.png", "1.10.png", "1.11.png"},
            {"1700000001_033333333.png", "1700000001_066666666.png", "1700000002_000000000.png",
             "1700000002_033333333.png"},
            {"cam0_frame1.png", "cam0_frame2.png", "cam0_frame3.png"},
@@ -227,6 +240,9 @@ TEST_F(DoubtfulInput, PairsOfCamerasBehindTheNumberCopiesAndAMaskAreNoFrames) {
     fs::remove_all(temp_ / "drive");
     const auto source = open_source(write_images(one_camera));
     EXPECT_TRUE(source && source->warnings.empty()) << one_camera[0] << message_of(source);
+    for (std::size_t i = 0; source && i < one_camera.size(); ++i) {
+      EXPECT_EQ(source->files[i].filename(), one_camera[i]);
+    }
   }
 }
 
@@ -378,6 +394,12 @@ TEST_F(DoubtfulInput, TrajectoriesBetweenCommas) {
               AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's")));
   EXPECT_THAT(message_of(read("#t [s], q_RS_w, q_RS_x\n1.25,5,6,7,1,0,0,0\n")),
               HasSubstr("qw before qx in a comment"));
+  for (const char* names : {"orientation.w orientation.x orientation.y orientation.z", "w x y z",
+                            "QW QX QY QZ", "q0 q1 q2 q3"}) {
+    EXPECT_THAT(message_of(read(fmt::format("# t x y z {}\n1.5 5 6 7 1 0 0 0\n", names))),
+                HasSubstr("qw before qx in a comment"));
+  }
+  EXPECT_TRUE(read("# w.r.t. the first camera: t x y z qx qy qz qw\n1.5 5 6 7 0 0 0 1\n"));
   EXPECT_TRUE(read("#t [ns]\n1700000000500000000,5,6,7,1,0,0,0\n")->is_of_body);
   EXPECT_THAT(message_of(read("0,5,6,7,1,0,0,0\n50000000,5,6,7,1,0,0,0\n")),
               AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's"), HasSubstr("steps of 5e+07")));

@@ -268,7 +268,7 @@ TEST(NaturalOrder, NumbersByTheirValue) {
                                            "a.png",      "a1b2.png", "a1b10.png", "a2b1.png",
                                            "frame2.png", "frame10",  "frame0100"};
   std::vector<std::string> names(sorted.rbegin(), sorted.rend());
-  std::sort(names.begin(), names.end(), comes_before);
+  std::ranges::sort(names, [](const auto& a, const auto& b) { return comes_before(a, b); });
   EXPECT_EQ(names, sorted);
   EXPECT_TRUE(comes_before("frame2", "frame10"));
   EXPECT_FALSE(comes_before("frame10", "frame2"));

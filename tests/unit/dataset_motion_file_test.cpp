@@ -40,8 +40,11 @@ TEST_F(MotionFile, OtherUnitsThatACommentNamesAreRefused) {
   EXPECT_THAT(speed_error("# t, speed [km/h]\n0 36\n"),
               HasSubstr("motion.txt:1: expected m/s, found km/h"));
   EXPECT_TRUE(read_speeds(write("# m/s, from km/h\n0 10\n")));
+  for (const char* unit : {"cm/s", "mm / s", "km / h", "[km h-1]", "kilometers per hour", "mph"}) {
+    EXPECT_THAT(speed_error(fmt::format("# speed {}\n0 36\n", unit)), HasSubstr("expected m/s"));
+  }
   EXPECT_THAT(message_of(read_gyro(write("0 1 2 3\n# deg/s\n"))),
-              HasSubstr("motion.txt:2: expected rad/s, found deg/s"));
+              HasSubstr("motion.txt:2: expected rad/s, found deg"));
 }
 
 TEST_F(MotionFile, EurocsTimesAreNanoseconds) {
