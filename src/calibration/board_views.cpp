@@ -98,22 +98,23 @@ Expected<BoardFit> check_fit(const BoardFit& fit,
   const bool is_finite = std::ranges::all_of(fit.numbers, [](const FittedNumber& number) {
     return std::isfinite(number.value) && std::isfinite(number.sigma);
   });
+  if (fit.error_px > kMaxError * size.width) {
+    return fail(fmt::format(
+        "expected corners within {:.1f} px of where a camera sees the board's, found {:.1f} px: "
+        "another board than --board says (an aprilgrid's gap is in metres), or a fisheye lens",
+        kMaxError * size.width, fit.error_px));
+  }
   const double ratio = fit.camera.fx_px / fit.camera.fy_px;
   const Status camera = check_camera(fit.camera);
   const double tilts_rad = spread_of_tilts(views);
-  if (!(tilts_rad > kMinTilts_rad) || std::max(ratio, 1.0 / ratio) > kMaxRatio || !camera) {
+  if (!is_finite || !(tilts_rad > kMinTilts_rad) || std::max(ratio, 1.0 / ratio) > kMaxRatio ||
+      !camera) {
     return fail(
         fmt::format("expected boards of different tilts, by 20 to 45 degrees, found ones "
                     "that tell no camera: tilts differ by {:.1f} degrees, fx {:.4g}, fy "
                     "{:.4g}{}",
                     kDegPerRad * tilts_rad, fit.camera.fx_px, fit.camera.fy_px,
                     camera ? "" : ", " + camera.error().message));
-  }
-  if (!is_finite || !(fit.error_px <= kMaxError * size.width)) {
-    return fail(fmt::format(
-        "expected corners within {:.1f} px of where a camera sees the board's, found {:.1f} px: "
-        "another board than --board says (an aprilgrid's gap is in metres), or a fisheye lens",
-        kMaxError * size.width, fit.error_px));
   }
   return fit;
 }

@@ -208,13 +208,26 @@ bool are_seconds(const std::string& before, const std::set<std::string>& numbers
          std::regex_match(before, kMinute);
 }
 
+/// Numbers alone ("_0", "_1") are cameras' where a few follow each other: else they may be seconds.
+bool may_be_cameras(const std::set<std::string>& names) {
+  constexpr std::size_t kMost = 6;
+  std::set<double> numbers;
+  for (const std::string& name : names) {
+    if (std::ranges::any_of(name, [](unsigned char c) { return std::isalpha(c) != 0; })) {
+      return names.size() > 1;
+    }
+    numbers.insert(std::strtod(name.c_str() + std::min<std::size_t>(name.size(), 1), nullptr));
+  }
+  return names.size() > 1 && names.size() <= kMost &&
+         *numbers.rbegin() - *numbers.begin() + 1.0 == static_cast<double>(names.size());
+}
+
 /// Error: frames of several cameras in pairs ("7_cam0", "7_cam1"), or an image beside its copy
 /// ("7 (1).png").
 Status check_names(const std::vector<fs::path>& files, const fs::path& given) {
   static const std::regex kCopy("(.+?)( \\([0-9]+\\)|[ _-]+[Cc]opy.*)");
   static const std::regex kCamera(
-      "(.*[0-9][^0-9]*?)([_-]?[A-Za-z]{2,}[_-]?[0-9]|[_.-][A-Za-z]?[0-9]{1,2})");
-  constexpr std::size_t kMaxCameras = 6;  // more numbers are those of frames
+      "(.*[0-9][^0-9]*?)([_-]?[A-Za-z]{2,}[_-]?[0-9]|[_.-][A-Za-z][0-9]|[_-][0-9]{1,2})");
   std::set<std::string> stems;
   std::set<std::string> moments;
   std::set<std::string> cameras;
@@ -234,7 +247,7 @@ Status check_names(const std::vector<fs::path>& files, const fs::path& given) {
   };
   constexpr double kMost = 0.9;  // some frames may be missing
   const auto num_pairs = static_cast<double>(moments.size() * cameras.size());
-  if (cameras.size() > 1 && cameras.size() <= kMaxCameras && moments.size() > cameras.size() &&
+  if (may_be_cameras(cameras) && moments.size() > cameras.size() &&
       static_cast<double>(files.size()) > kMost * num_pairs) {
     return fail_of(files[1], *cameras.begin());
   }

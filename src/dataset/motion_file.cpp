@@ -54,7 +54,8 @@ Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file,
                                           const std::optional<std::pair<double, double>>& span_s) {
   constexpr double kSigmaShare = 0.02;
   constexpr double kMinSigma = 0.05;
-  STEMVO_TRY(check_unit(file, "km *(/|p|h)|kilomet|kph|mph|knots|miles|[cm]m */ *s", "m/s"));
+  STEMVO_TRY(
+      check_unit(file, "km *(/|p|per)? *h|kilomet[a-z]*|kph|mph|knots|miles|[cm]m */ *s", "m/s"));
   STEMVO_TRY_GET(const auto found, read_timed_rows(file, {2, 3}, "a time, m/s and maybe a sigma",
                                                    {.span_s = span_s}));
   TimedRows<SpeedRow> speeds{.rows = {}, .note = found.note};

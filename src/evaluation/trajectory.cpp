@@ -53,7 +53,7 @@ std::optional<Format> format_of_commas(std::string_view row, bool says_nanosecon
   return Format::kEuroc;
 }
 
-/// Names that end with w, x, y, z in this order ("qw qx ..", "orientation.w orientation.x ..", "w x
+/// Names that end with w, x, .. in this order ("qw qx ..", "orientation.w orientation.x ..", "w x
 /// y z"), or are counted, whose first is w in most programs.
 bool names_w_first(std::string_view comment) {
   std::string axes;
@@ -70,7 +70,7 @@ bool names_w_first(std::string_view comment) {
     axes += is_axis ? name.back() : ' ';
     name.clear();
   }
-  static const std::regex kOrder("w[ q]{0,2}x[ q]{0,2}y[ q]{0,2}z");
+  static const std::regex kOrder("w[ q]{0,2}x");
   return std::regex_search(axes, kOrder);
 }
 
