@@ -208,9 +208,11 @@ bool are_seconds(const std::string& before, const std::set<std::string>& numbers
          std::regex_match(before, kMinute);
 }
 
-/// Numbers alone ("_0", "_1") are cameras' where a few follow each other: else they may be seconds.
-bool may_be_cameras(const std::set<std::string>& names) {
+/// Numbers alone ("_0", "_1") are cameras' where a few follow each other, many times: else they may
+/// be seconds.
+bool may_be_cameras(const std::set<std::string>& names, std::size_t num_moments) {
   constexpr std::size_t kMost = 6;
+  constexpr std::size_t kMany = 5;
   std::set<double> numbers;
   for (const std::string& name : names) {
     if (std::ranges::any_of(name, [](unsigned char c) { return std::isalpha(c) != 0; })) {
@@ -218,7 +220,7 @@ bool may_be_cameras(const std::set<std::string>& names) {
     }
     numbers.insert(std::strtod(name.c_str() + std::min<std::size_t>(name.size(), 1), nullptr));
   }
-  return names.size() > 1 && names.size() <= kMost &&
+  return names.size() > 1 && names.size() <= kMost && num_moments >= kMany &&
          *numbers.rbegin() - *numbers.begin() + 1.0 == static_cast<double>(names.size());
 }
 
@@ -247,7 +249,7 @@ Status check_names(const std::vector<fs::path>& files, const fs::path& given) {
   };
   constexpr double kMost = 0.9;  // some frames may be missing
   const auto num_pairs = static_cast<double>(moments.size() * cameras.size());
-  if (may_be_cameras(cameras) && moments.size() > cameras.size() &&
+  if (may_be_cameras(cameras, moments.size()) && moments.size() > cameras.size() &&
       static_cast<double>(files.size()) > kMost * num_pairs) {
     return fail_of(files[1], *cameras.begin());
   }

@@ -66,8 +66,10 @@ bool names_w_first(std::string_view comment) {
     if (name == "q0") {
       return true;
     }
-    const bool is_axis = name.size() == 1 || (name.size() == 2 && name.front() == 'q');
-    axes += is_axis ? name.back() : ' ';
+    if (!name.empty()) {
+      const bool is_axis = name.size() == 1 || (name.size() == 2 && name.front() == 'q');
+      axes += is_axis ? name.back() : ' ';
+    }
     name.clear();
   }
   static const std::regex kOrder("w[ q]{0,2}x");

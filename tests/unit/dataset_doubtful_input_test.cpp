@@ -218,7 +218,8 @@ TEST_F(DoubtfulInput, PairsOfCamerasBehindTheNumberCopiesAndAMaskAreNoFrames) {
                                      "right1700000014.png", "right1700000024.png"})),
               AllOf(HasSubstr("right1700000014.png"), HasSubstr("/left*.png'")));
   for (const auto& two_cameras : std::vector<std::vector<std::string>>{
-           {"01_0.png", "01_1.png", "02_0.png", "02_1.png", "03_0.png", "03_1.png"},
+           {"01_0.png", "01_1.png", "02_0.png", "02_1.png", "03_0.png", "03_1.png", "04_0.png",
+            "04_1.png", "05_0.png", "05_1.png"},
            {"1-c0.png", "1-c1.png", "2-c0.png", "2-c1.png", "3-c0.png", "3-c1.png"},
            {"00001_left.png", "00004_right.png", "00051_left.png", "00054_right.png",
             "00101_left.png", "00104_right.png"},
