@@ -42,8 +42,5 @@ struct Listing {
 [[nodiscard]] bool is_pattern(const std::filesystem::path& path);
 /// The shell's patterns: `*` stands for any characters, `?` for one, `[0-4]` for one of these.
 [[nodiscard]] bool matches_pattern(const std::string& name, const std::string& pattern);
-/// Character by character, but whole numbers by their value: frame2 comes before frame10. With
-/// `has_decimals` digits behind "7." are its decimals: 5.25 comes before 5.3.
-[[nodiscard]] bool comes_before(std::string_view a, std::string_view b, bool has_decimals = false);
 
 }  // namespace stemvo::dataset

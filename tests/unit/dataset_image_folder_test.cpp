@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/frame_files.hpp"
 #include "dataset/frame_source.hpp"
+#include "dataset/image_names.hpp"
 #include "dataset/listing.hpp"
 #include "support/matchers.hpp"
 #include "support/test.hpp"
