@@ -32,7 +32,7 @@ def _members(value: Any) -> dict[str, Any]:
 
 def _short(value: Any) -> str:
     if isinstance(value, (list, tuple)):
-        return f"{len(value)} of them"
+        return " and ".join(map(_short, value)) if value and hasattr(value[0], "shape") and isinstance(value, tuple) else f"{len(value)} of them"
     return "x".join(map(str, value.shape)) if hasattr(value, "shape") else repr(value)
 
 
