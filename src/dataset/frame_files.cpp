@@ -166,6 +166,13 @@ FrameSource list_frames(const FrameRange& range,
   return frames;
 }
 
+std::string warn_of_spare_poses(const PoseFile& truth, std::size_t num_frames) {
+  return truth.timestamps_s.empty() && truth.poses.size() > num_frames
+             ? fmt::format("{}: {} poses for {} frames: the first ones are taken for theirs",
+                           truth.file.string(), truth.poses.size(), num_frames)
+             : "";
+}
+
 Status add_ground_truth(FrameSource& frames,
                         const fs::path& poses,
                         const std::optional<fs::path>& camera_file,
@@ -178,6 +185,7 @@ Status add_ground_truth(FrameSource& frames,
     return fail(fmt::format("{}: expected a pose for each of {} images, found {} poses",
                             poses.string(), num_files, truth.poses.size()));
   }
+  add_line(frames.warnings, warn_of_spare_poses(truth, num_files));
   STEMVO_TRY_GET(frames.ground_truth,
                  match_frames(truth, frames.range.begin, frames.timestamps_s, tolerance_s));
   return {};

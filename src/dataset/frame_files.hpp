@@ -42,6 +42,9 @@ namespace stemvo::dataset {
                                                  const std::string& owner,
                                                  std::string_view things = "frames");
 
+/// Where there are more poses without times than frames: some may be missing. Empty: not so.
+[[nodiscard]] std::string warn_of_spare_poses(const PoseFile& truth, std::size_t num_frames);
+
 /// Files and times of the range; the rest of the list is left as it is made.
 [[nodiscard]] FrameSource list_frames(const FrameRange& range,
                                       const std::vector<std::filesystem::path>& files,

@@ -310,6 +310,9 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   if (request.ground_truth) {
     STEMVO_TRY_GET(const auto truth, read_truth(*request.ground_truth, request.camera_file));
     STEMVO_TRY(check_length(truth, frames, request));
+    if (!request.frames && frames.stream->expected_frames > 0) {
+      add_line(frames.warnings, warn_of_spare_poses(truth, frames.stream->expected_frames));
+    }
     frames.ground_truth_file = request.ground_truth;
     frames.match = [truth, request](const std::vector<double>& times_s) {
       return match_frames(truth, request.frames.value_or(FrameRangeRequest{}).begin, times_s,

@@ -117,6 +117,13 @@ std::string doubt_of(const Camera& camera) {
     return fmt::format("a field of view of {:.1f} degrees is small: is the focal length in pixels?",
                        view_deg_of(camera));
   }
+  constexpr double kMaxView_deg = 130.0;
+  if (view_deg_of(camera) > kMaxView_deg && camera.distortion != Distortion::kEquidistant) {
+    return fmt::format(
+        "a field of view of {:.0f} degrees is large for a lens that is no fisheye: "
+        "is the focal length in pixels?",
+        view_deg_of(camera));
+  }
   constexpr double kMaxRatio = 1.2;
   const double ratio = camera.fx_px / camera.fy_px;
   if (std::max(ratio, 1.0 / ratio) > kMaxRatio) {

@@ -76,6 +76,10 @@ TEST_F(DoubtfulInput, ACentreFarFromTheMiddleIsSaid) {
                                    "distortion_model: none\nrate_hz: 10\n");
   EXPECT_THAT(open_source(request)->warnings,
               ElementsAre(HasSubstr("a field of view of 6.1 degrees is small")));
+  request.camera_file = temp_.file("wide.yaml",
+                                   "resolution: [32, 24]\nintrinsics: [6, 6, 15.5, 11.5]\n"
+                                   "distortion_model: none\nrate_hz: 10\n");
+  EXPECT_THAT(open_source(request)->warnings, ElementsAre(HasSubstr("degrees is large")));
 }
 
 TEST_F(DoubtfulInput, PartsOfImagesAndSkewAreRefusedByName) {

@@ -73,6 +73,14 @@ TEST_F(KittiSequenceTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
   EXPECT_LT((truth[1].translation - Eigen::Vector3d(0, 0, 2)).norm(), 1e-12);
 }
 
+TEST_F(KittiSequenceTest, MorePosesThanImagesAreSaid) {
+  EXPECT_THAT(open_kitti(folder_)->warnings, IsEmpty());
+  EXPECT_THAT(open_kitti(folder_, frames("1:3"))->warnings, IsEmpty());
+  write(poses(), pose_lines(8));
+  EXPECT_THAT(open_kitti(folder_)->warnings,
+              ElementsAre(HasSubstr("07.txt: 8 poses for 4 frames")));
+}
+
 TEST_F(KittiSequenceTest, NoPoseFileMeansNoTruth) {
   fs::remove(poses());
   const auto sequence = open_kitti(folder_);
