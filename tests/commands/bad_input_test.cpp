@@ -32,9 +32,10 @@ TEST_F(BadInput, BrokenImagesAreOneWarningEach) {
   write_file(images / "000008.png", twice.insert(33, twice.substr(8, 25)));  // two headers
   const ProgramResult result = run({"--quiet", "--set", "scale.source=none"});
   EXPECT_EQ(result.exit_code, 0);
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 5) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 6) << result.err;
   EXPECT_THAT(result.err,
-              AllOf(HasSubstr("warning: " + images.string() + "/000003.png"),
+              AllOf(HasSubstr("60 poses for 10 frames"),
+                    HasSubstr("warning: " + images.string() + "/000003.png"),
                     HasSubstr("000008.png: expected a sound PNG image, found one damaged"),
                     Not(HasSubstr("libpng"))));
 }

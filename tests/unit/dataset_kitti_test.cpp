@@ -74,11 +74,10 @@ TEST_F(KittiSequenceTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
 }
 
 TEST_F(KittiSequenceTest, MorePosesThanImagesAreSaid) {
-  EXPECT_THAT(open_kitti(folder_)->warnings, IsEmpty());
-  EXPECT_THAT(open_kitti(folder_, frames("1:3"))->warnings, IsEmpty());
+  EXPECT_THAT(open_kitti(folder_)->warnings, Not(Contains(HasSubstr("poses for"))));
+  EXPECT_THAT(open_kitti(folder_, frames("1:3"))->warnings, Not(Contains(HasSubstr("poses for"))));
   write(poses(), pose_lines(8));
-  EXPECT_THAT(open_kitti(folder_)->warnings,
-              ElementsAre(HasSubstr("07.txt: 8 poses for 4 frames")));
+  EXPECT_THAT(open_kitti(folder_)->warnings, Contains(HasSubstr("07.txt: 8 poses for 4 frames")));
 }
 
 TEST_F(KittiSequenceTest, NoPoseFileMeansNoTruth) {
