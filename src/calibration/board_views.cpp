@@ -95,9 +95,10 @@ Expected<BoardFit> check_fit(const BoardFit& fit,
   constexpr double kMaxError = 0.003;  // of the image's width
   constexpr double kMinTilts_rad = 0.1;
   constexpr double kMaxRatio = 1.5;  // of pixels' sides
-  const bool is_finite = std::ranges::all_of(fit.numbers, [](const FittedNumber& number) {
-    return std::isfinite(number.value) && std::isfinite(number.sigma);
-  });
+  const bool is_finite =
+      std::isfinite(fit.error_px) && std::ranges::all_of(fit.numbers, [](const auto& number) {
+        return std::isfinite(number.value) && std::isfinite(number.sigma);
+      });
   if (fit.error_px > kMaxError * size.width) {
     return fail(fmt::format(
         "expected corners within {:.1f} px of where a camera sees the board's, found {:.1f} px: "

@@ -27,7 +27,10 @@ Status check_unit(const std::filesystem::path& file,
                   const std::string& expected) {
   STEMVO_TRY_GET(const auto lines, read_lines(file));
   const std::regex name(other, std::regex::icase);
-  const std::regex own("(^|[^a-z])" + expected, std::regex::icase);
+  const std::size_t slash = expected.find('/');  // "rad s^-1", too
+  const std::regex own(
+      "(^|[^a-z])" + expected.substr(0, slash) + "[ /]+" + expected.substr(slash + 1),
+      std::regex::icase);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     std::smatch found;
     if (std::regex_search(lines[i], found, name) && !std::regex_search(lines[i], own)) {

@@ -16,18 +16,10 @@ namespace {
 constexpr double kDoubtful_percent = 50.0;  ///< errors of no odometry, of motions of any unit
 constexpr double kFits = 0.2;               ///< of the error as given: it is the other convention
 
-double length(std::span<const Rigid3> poses) {
-  double sum = 0.0;
-  for (std::size_t i = 1; i < poses.size(); ++i) {
-    sum += (poses[i].translation - poses[i - 1].translation).norm();
-  }
-  return sum;
-}
-
 /// Mean error of motions over an eighth of the path, after the lengths were made alike.
 double motion_error_percent(Trajectory estimate, std::span<const Rigid3> ground_truth) {
   constexpr std::size_t kMaxSegments = 500;
-  const double scale = length(ground_truth) / length(estimate);
+  const double scale = length_of_path(ground_truth) / length_of_path(estimate);
   for (Rigid3& pose : estimate) {
     pose.translation *= scale;
   }

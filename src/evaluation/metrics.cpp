@@ -135,6 +135,8 @@ std::vector<double> segment_lengths(const EvaluationOptions& options, double pat
 
 }  // namespace
 
+double length_of_path(std::span<const Rigid3> poses) { return distances_m(poses).back(); }
+
 std::vector<SegmentError> segment_errors(std::span<const Rigid3> estimate,
                                          std::span<const Rigid3> ground_truth,
                                          std::span<const double> lengths_m,
@@ -176,7 +178,7 @@ Metrics evaluate(std::span<const Rigid3> estimate,
   const Trajectory truth = relative_to_first(ground_truth);
 
   Metrics metrics;
-  metrics.path_length_m = distances_m(truth).back();
+  metrics.path_length_m = length_of_path(truth);
   metrics.average_offset_m = average_offset_m(est, truth);
   metrics.null_offset_m = average_offset_m(Trajectory(truth.size()), truth);
   metrics.segment_lengths_m = segment_lengths(options, metrics.path_length_m);
@@ -190,7 +192,7 @@ DenseErrors dense_errors(std::span<const Rigid3> estimate,
                          std::span<const Rigid3> ground_truth,
                          std::size_t max_segments) {
   STEMVO_CHECK(!estimate.empty(), "at least one pose");
-  const double length_m = kDenseShare * distances_m(ground_truth).back();
+  const double length_m = kDenseShare * length_of_path(ground_truth);
   const std::size_t step = (estimate.size() - 1) / max_segments + 1;
   DenseErrors errors;
   for (const SegmentError& one : segment_errors(estimate, ground_truth, {&length_m, 1}, step)) {

@@ -41,6 +41,9 @@ struct Metrics {
   double rpe_rotation_deg = 0.0;
 };
 
+/// Sum of the steps; at least one pose.
+[[nodiscard]] double length_of_path(std::span<const Rigid3> poses);
+
 /// KITTI devkit (vo_facts 4c: every 10th start frame), offset, ATE, RPE. Both have the same length
 /// (checked), at least one pose.
 [[nodiscard]] Metrics evaluate(std::span<const Rigid3> estimate,

@@ -45,6 +45,7 @@ TEST_F(MotionFile, OtherUnitsThatACommentNamesAreRefused) {
   }
   EXPECT_THAT(message_of(read_gyro(write("0 1 2 3\n# deg/s\n"))),
               HasSubstr("motion.txt:2: expected rad/s, found deg"));
+  EXPECT_TRUE(read_gyro(write("# t, rad s^-1, temperature in deg C\n0 1 2 3\n")));
 }
 
 TEST_F(MotionFile, EurocsTimesAreNanoseconds) {

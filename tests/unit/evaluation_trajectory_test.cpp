@@ -181,6 +181,33 @@ TEST(PoseFile, ErrorsNameFileAndLine) {
   EXPECT_THAT(error_of(""), HasSubstr("poses: expected at least one pose"));
 }
 
+TEST(PoseFile, NumbersBetweenCommasAndNamesInComments) {
+  const TempFolder folder;
+  const auto read = [&](const std::string& text) { return read_pose_file(folder.file("p", text)); };
+  const auto kitti = read("1,0,0,5,0,1,0,6,0,0,1,7\n");
+  EXPECT_THAT(kitti->timestamps_s, IsEmpty());
+  EXPECT_EQ(kitti->poses[0].translation, Eigen::Vector3d(5, 6, 7));
+  const auto tum = read("# t,x\n1700000000.5,5,6,7,0,0,0,1\n");
+  EXPECT_THAT(tum->timestamps_s, ElementsAre(1700000000.5));
+  EXPECT_FALSE(tum->is_of_body);
+  EXPECT_EQ(tum->poses[0].rotation.w(), 1.0) << "w comes last";
+  EXPECT_THAT(read("1700000000500000000,5,6,7,0,0,0,1\n").error().message,
+              AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's")));
+  EXPECT_THAT(message_of(read("#t [s], q_RS_w, q_RS_x\n1.25,5,6,7,1,0,0,0\n")),
+              HasSubstr("qw before qx in a comment"));
+  for (const char* names : {"orientation.w orientation.x orientation.y orientation.z", "w x y z",
+                            "QW QX QY QZ", "q0 q1 q2 q3"}) {
+    EXPECT_THAT(message_of(read(fmt::format("# t x y z {}\n1.5 5 6 7 1 0 0 0\n", names))),
+                HasSubstr("qw before qx in a comment"));
+  }
+  EXPECT_TRUE(read("# w.r.t. the first camera: t x y z qx qy qz qw\n1.5 5 6 7 0 0 0 1\n"));
+  EXPECT_TRUE(read("#t [ns]\n1700000000500000000,5,6,7,1,0,0,0\n")->is_of_body);
+  EXPECT_THAT(message_of(read("0,5,6,7,1,0,0,0\n50000000,5,6,7,1,0,0,0\n")),
+              AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's"), HasSubstr("steps of 5e+07")));
+  EXPECT_THAT(message_of(read("1.25,5,6,7,1,0,0,0,9\n1.75,5,6,7,1,0,0,0,9\n")),
+              AllOf(HasSubstr("taken for EuRoC's rows"), HasSubstr("found steps of 0.5")));
+}
+
 TEST(PoseFile, PosesAreInTheOrderOfTheirTimes) {
   const TempFolder folder;
   const auto file =
