@@ -38,8 +38,8 @@ class DescriptorFrontEnd final : public FrontEnd {
   explicit DescriptorFrontEnd(const FeatureOptions& options)
       : options_(options), feature_(create_feature(options)) {}
 
-  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(const ChannelImage& channel,
-                                                            const cv::Mat& mask) const override {
+  [[nodiscard]] std::shared_ptr<ImagePyramid> prepare(const ChannelImage& channel,
+                                                      const cv::Mat& mask) const override {
     auto described = std::make_shared<Described>(channel);
     described->mask = with_mask(mask);
     std::vector<cv::KeyPoint> found;
@@ -60,9 +60,8 @@ class DescriptorFrontEnd final : public FrontEnd {
     }
     timed(Stage::kDescription,
           [&] { feature_->compute(channel.pixels, kept, described->descriptors); });
-    described->uv.reserve(kept.size());
     for (const cv::KeyPoint& keypoint : kept) {
-      described->uv.push_back(channel.map.to_input({keypoint.pt.x, keypoint.pt.y}));
+      described->uv.emplace_back(keypoint.pt.x, keypoint.pt.y);
     }
     return described;
   }
@@ -77,8 +76,8 @@ class DescriptorFrontEnd final : public FrontEnd {
       for (const cv::DMatch& pair : match(*last_, *current)) {
         const auto from = static_cast<std::size_t>(pair.queryIdx);
         const auto to = static_cast<std::size_t>(pair.trainIdx);
-        matches.prev_uv.push_back(last_->uv[from]);
-        matches.cur_uv.push_back(current->uv[to]);
+        matches.prev_uv.push_back(last_->channel.map.to_input(last_->uv[from]));
+        matches.cur_uv.push_back(current->channel.map.to_input(current->uv[to]));
         track_ids[to] = track_ids_[from] >= 0 ? track_ids_[from] : num_tracks_++;
         matches.track_ids.push_back(track_ids[to]);
         matched_.push_back(to);
@@ -101,7 +100,7 @@ class DescriptorFrontEnd final : public FrontEnd {
  private:
   struct Described : ImagePyramid {
     using ImagePyramid::ImagePyramid;
-    std::vector<Eigen::Vector2d> uv;  ///< input pixels
+    std::vector<Eigen::Vector2d> uv;  ///< pixels of the channel
     cv::Mat descriptors;              ///< one row per keypoint
   };
 

@@ -63,8 +63,8 @@ class FrontEnd {
   void set_mask(const cv::Mat& mask) { mask_ = mask; }
   /// The part of process() that needs only the image: it may run ahead, in another thread than
   /// the rest, one call at a time. `mask`: as set_mask(), which counts as well; of this image.
-  [[nodiscard]] virtual std::shared_ptr<const ImagePyramid> prepare(const ChannelImage& channel,
-                                                                    const cv::Mat& mask) const = 0;
+  [[nodiscard]] virtual std::shared_ptr<ImagePyramid> prepare(const ChannelImage& channel,
+                                                              const cv::Mat& mask) const = 0;
   /// Matches from the previous image (none on the first). An image of another size starts over.
   /// `image` was prepared by this front end (not checked).
   [[nodiscard]] virtual Matches process(std::shared_ptr<const ImagePyramid> image,

@@ -103,8 +103,8 @@ class PatchFrontEnd final : public PointFrontEnd {
  public:
   using PointFrontEnd::PointFrontEnd;
 
-  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(const ChannelImage& channel,
-                                                            const cv::Mat& mask) const override {
+  [[nodiscard]] std::shared_ptr<ImagePyramid> prepare(const ChannelImage& channel,
+                                                      const cv::Mat& mask) const override {
     const StageTimer timer(Stage::kPyramid);
     auto image = std::make_shared<PatchPyramid>(channel);
     image->mask = with_mask(mask);

@@ -38,6 +38,7 @@ struct KeptKeyframe {
   int frame = 0;
   double time_s = 0.0;
   Camera camera;             ///< as it was when the frame came
+  Eigen::Vector2d radial = Eigen::Vector2d::Zero();  ///< of the RadialLens that corners are freed of
   Rigid3 world_from_camera;  ///< in the trajectory, as it came
   std::vector<KeptCorner>
       corners;  ///< ordered by track id; empty: it shows a place that is kept already

@@ -67,9 +67,9 @@ class Adjustment {
       poses_.emplace_back(Rigid3(at.rotation, at.translation).inverse());
     }
     if (options.camera_sigma) {
-      const Camera& last = map.keyframes.back().camera;
-      camera_ = {last.cx_px - options.camera.cx_px, last.cy_px - options.camera.cy_px,
-                 last.fx_px / options.camera.fx_px - 1.0};
+      const KeptKeyframe& last = map.keyframes.back();
+      camera_ = {last.camera.cx_px - options.camera.cx_px, last.camera.cy_px - options.camera.cy_px,
+                 last.camera.fx_px / options.camera.fx_px - 1.0, last.radial[0], last.radial[1]};
     }
     place_points();
     add_corners();
@@ -119,6 +119,13 @@ class Adjustment {
   [[nodiscard]] Eigen::Vector2d uv(const MapView& view) const {
     return map_.keyframes[slot(view.keyframe)].corners[slot(view.corner)].uv.cast<double>();
   }
+  /// As the frame has it: the lens is an unknown. Another recording's stays as it was found.
+  [[nodiscard]] Eigen::Vector2d frame_uv(const MapView& view) const {
+    const KeptKeyframe& keyframe = map_.keyframes[slot(view.keyframe)];
+    return view.keyframe < options_.num_of_other_camera
+               ? uv(view)
+               : radial_lens(keyframe.camera, keyframe.radial).distort(uv(view));
+  }
 
   [[nodiscard]] Eigen::Vector2d ray(const MapView& view) {
     const Camera& camera = base_camera(view.keyframe);
@@ -147,7 +154,7 @@ class Adjustment {
       for (const MapView& view : tracks_[i]) {
         AdjustedPose& pose = poses_[slot(view.keyframe)];
         auto* error =
-            new CornerError(uv(view), base_camera(view.keyframe), points_[i], pose, sigma_px_);
+            new CornerError(frame_uv(view), base_camera(view.keyframe), points_[i], pose, sigma_px_);
         double* camera = camera_change(view.keyframe);
         residuals_.push_back({problem_.AddResidualBlock(error, &corner_loss_, points_[i].at.data(),
                                                         pose.delta.data(), camera),

@@ -23,7 +23,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "numbers are written as they lie");
 
 constexpr std::string_view kMagic = "stemvo map\r\n\x1a\n";  // a transfer as text damages it
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr int kMaxMap_MB = 4000;
 
 template <typename T>
@@ -119,6 +119,7 @@ void pass_list(auto& archive, auto& list) {
 void pass(auto& archive, KeptKeyframe& keyframe) {
   pass_all(archive, keyframe.frame, keyframe.time_s);
   pass(archive, keyframe.camera);
+  pass_each(archive, keyframe.radial);
   pass(archive, keyframe.world_from_camera);
   pass_list(archive, keyframe.corners);
   pass_list(archive, keyframe.descriptors);
@@ -195,7 +196,7 @@ bool is_corner(const KeptCorner& corner) {
 std::string_view flaw_of(const KeptKeyframe& keyframe) {
   return !is_number(keyframe.frame)        ? "a frame's number"
          : !std::isfinite(keyframe.time_s) ? "a finite time"
-         : !check_camera(keyframe.camera)  ? "a camera"
+         : !check_camera(keyframe.camera) || !keyframe.radial.allFinite() ? "a camera"
          : !is_motion(keyframe.world_from_camera.rotation, keyframe.world_from_camera.translation)
              ? "a pose"
          : !std::ranges::all_of(keyframe.corners, is_corner) ? "finite corners"

@@ -75,6 +75,7 @@ void ChannelOdometry::track(Frame frame) {
   const ImageClue clue = clue_of(frame);
   if (frame.has_image()) {
     Stopwatch watch;
+    frame.pyramid->channel.map.lens = lens_;
     frame.matches = front_end_->process(frame.pyramid, clue);
     frame.times.features_ms = watch.lap_ms();
   }
@@ -116,6 +117,7 @@ void ChannelOdometry::localize() {
   FrameInWork& work = localized_.emplace(FrameInWork{*std::exchange(tracked_, std::nullopt), {}});
   Stopwatch watch;
   work.localized = estimator_->localize(work.frame);
+  lens_ = estimator_->lens();
   if (work.frame.has_image()) {
     front_end_->remove_outliers(kept_tracks(work.localized));
     front_end_->expect_projections(std::move(work.localized.projections));

@@ -82,6 +82,7 @@ class ChannelOdometry {
   ImageTurn image_turn_;
   bool aligns_images_;  ///< for the front end that asks for turns
   double last_image_s_ = 0.0;
+  RadialLens lens_;  ///< of the next frame to be tracked: what the one before it was localized by
   int num_tracked_ = 0;
   std::vector<double> times_s_;
   FrameClock clock_;  ///< of the frames tracked

@@ -37,7 +37,7 @@ struct Frame {
   FrameHints hints;
   std::vector<Way> ways;  ///< that came before this frame did
   cv::Mat image;          ///< as given, gray or RGB: where landmarks get their colour
-  std::shared_ptr<const ImagePyramid> pyramid;  ///< of the channel: where points are tracked
+  std::shared_ptr<ImagePyramid> pyramid;  ///< of the channel: where points are tracked
   std::shared_ptr<const RoadImage> road;        ///< null: the road is not asked
   Matches matches;                              ///< none on the first image
   /// prev_from_cur from the last image, by the whole of both (ImageTurn). nullopt: not known.
@@ -121,6 +121,8 @@ class Estimator {
   [[nodiscard]] virtual std::optional<CameraEstimate> camera_estimate() const {
     return std::nullopt;
   }
+  /// What the next frames' pixels are freed of.
+  [[nodiscard]] virtual RadialLens lens() const { return {}; }
   /// As Odometry::landmarks_since; none where there is no window.
   [[nodiscard]] virtual LandmarkChanges landmarks_since(int /*version*/) const { return {}; }
   /// The map that is remembered, the keyframes of the window among it; nothing where there is no

@@ -33,6 +33,8 @@ constexpr double kMinSigmas = 2.0;
 constexpr double kBias_px = 0.3;
 /// The camera moves by this at a keyframe: the window can follow.
 constexpr double kMaxStep_px = 0.25;
+/// .. and its lens moves the image's sides by this: while it is not right, lengths drift in turns.
+constexpr double kMaxLensStep_px = 1.0;
 
 /// The numbers are finite and the information is positive.
 bool is_plausible(const CameraMeasurement& found) {
@@ -109,13 +111,21 @@ void SelfCalibration::fuse_result() {
   information_ += found->information / kSigmaFactorSq;
   ++num_runs_;
   const IntrinsicsDelta sigmas = sigma();
-  const auto insists = [&](int i, double max, double bias) {
-    return sigmas[i] < max && std::abs(mean_[i]) > kMinSigmas * std::hypot(sigmas[i], bias);
+  const auto insists = [](double mean, double sigma, double max, double bias) {
+    return sigma < max && std::abs(mean) > kMinSigmas * std::hypot(sigma, bias);
   };
   target_.setZero();
-  target_[0] = insists(0, kMaxSigma_px, kBias_px) ? mean_[0] : 0.0;
-  target_[1] = insists(1, kMaxSigma_px, kBias_px) ? mean_[1] : 0.0;
-  if (refinement_ == CameraRefinement::kAll && insists(2, kMaxSigmaOfFocal, 0.0)) {
+  for (const int i : {0, 1}) {
+    target_[i] = insists(mean_[i], sigmas[i], kMaxSigma_px, kBias_px) ? mean_[i] : 0.0;
+  }
+  // k1 and k2 are told together only: what they do to the image's side is asked.
+  const Eigen::Vector2d side = side_px();
+  const Eigen::Matrix2d covariance = information_.inverse().bottomRightCorner<2, 2>();
+  if (insists(side.dot(mean_.tail<2>()), std::sqrt(side.dot(covariance * side)), kMaxSigma_px,
+              kBias_px)) {
+    target_.tail<2>() = mean_.tail<2>();
+  }
+  if (refinement_ == CameraRefinement::kAll && insists(mean_[2], sigmas[2], kMaxSigmaOfFocal, 0.0)) {
     target_[2] = mean_[2];
   }
 }
@@ -128,6 +138,27 @@ void SelfCalibration::approach_target() {
   const double focal = step(2, kMaxStep_px / given_.mean_focal_px());
   camera_.fx_px += focal * given_.fx_px;
   camera_.fy_px += focal * given_.fy_px;
+  approach_lens(left.tail<2>());
+}
+
+/// The run's pixels follow, so that it is measured as one.
+void SelfCalibration::approach_lens(const Eigen::Vector2d& left) {
+  if (left.isZero()) {
+    return;
+  }
+  const RadialLens before = lens();
+  radial_ += std::min(1.0, kMaxLensStep_px / std::abs(side_px().dot(left))) * left;
+  for (Keyframe& keyframe : run_.keyframes) {
+    for (Observation& point : keyframe.points) {
+      point.uv = lens().undistort(before.distort(point.uv));
+    }
+  }
+}
+
+Eigen::Vector2d SelfCalibration::side_px() const {
+  const double half_px = std::max(given_.cx_px, given_.width_px - given_.cx_px);
+  const double r_sq = std::pow(half_px / given_.fx_px, 2);
+  return half_px * Eigen::Vector2d(r_sq, r_sq * r_sq);
 }
 
 }  // namespace stemvo

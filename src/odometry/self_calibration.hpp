@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "geometry/bundle.hpp"
+#include "geometry/radial_lens.hpp"
 #include "odometry/window.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/frame_result.hpp"
@@ -41,6 +42,9 @@ class SelfCalibration {
 
   /// The given one, or on its way to the target.
   [[nodiscard]] const Camera& camera() const { return camera_; }
+  /// The distortion that is left, or on its way to the target.
+  [[nodiscard]] RadialLens lens() const { return radial_lens(camera_, radial_); }
+  [[nodiscard]] const Eigen::Vector2d& radial() const { return radial_; }
   /// The estimate of all runs, whether it is significant or not, after one that is still measured;
   /// nullopt: nothing is refined.
   [[nodiscard]] std::optional<CameraEstimate> estimate() const {
@@ -67,11 +71,15 @@ class SelfCalibration {
   /// The run that is measured, if there is one; waits for it.
   void fuse_result();
   void approach_target();
+  void approach_lens(const Eigen::Vector2d& left);
+  /// What a pixel at the image's side is moved by, px, for k1 and k2 of 1.
+  [[nodiscard]] Eigen::Vector2d side_px() const;
   [[nodiscard]] IntrinsicsDelta applied() const {
     IntrinsicsDelta change = IntrinsicsDelta::Zero();
     change[0] = camera_.cx_px - given_.cx_px;
     change[1] = camera_.cy_px - given_.cy_px;
     change[2] = camera_.fx_px / given_.fx_px - 1.0;
+    change.tail<2>() = radial_;
     return change;
   }
   /// Standard deviations of mean_.
@@ -79,6 +87,7 @@ class SelfCalibration {
 
   Camera given_;
   Camera camera_;
+  Eigen::Vector2d radial_ = Eigen::Vector2d::Zero();  ///< k1, k2
   CameraRefinement refinement_;
   bool may_begin_threads_;
   IntrinsicsDelta target_ =

@@ -107,7 +107,16 @@ void WholeMap::take_in(const MapAdjustment& adjusted) {
   camera.fy_px *= 1.0 + change[2];
   camera_sigma = adjusted.camera.sigma;
   for (KeptKeyframe& keyframe : kept.keyframes) {
-    keyframe.camera = keyframe.frame < 0 ? keyframe.camera : camera;
+    if (keyframe.frame < 0) {
+      continue;
+    }
+    const RadialLens before = radial_lens(keyframe.camera, keyframe.radial);
+    keyframe.camera = camera;
+    keyframe.radial = change.tail<2>();
+    const RadialLens after = radial_lens(keyframe.camera, keyframe.radial);
+    for (KeptCorner& corner : keyframe.corners) {
+      corner.uv = after.undistort(before.distort(corner.uv.cast<double>())).cast<float>();
+    }
   }
 }
 

@@ -73,6 +73,8 @@ class WindowEstimator final : public Estimator {
     return calibration_.estimate();
   }
 
+  [[nodiscard]] RadialLens lens() const override { return calibration_.lens(); }
+
   [[nodiscard]] const Window& window() const { return window_; }
 
  private:
@@ -108,7 +110,8 @@ class WindowEstimator final : public Estimator {
   void reset_reference(View reference);
   [[nodiscard]] bool open_window(View view);
   [[nodiscard]] WindowView window_view() const {
-    return {window_, history_, camera(), trajectory_, times_s_, metric_sigma_, view_.frame};
+    return {window_,     history_, camera(),      calibration_.radial(),
+            trajectory_, times_s_, metric_sigma_, view_.frame};
   }
   /// The camera in use: SelfCalibration owns it, everything else takes it as an argument.
   [[nodiscard]] const Camera& camera() const { return calibration_.camera(); }

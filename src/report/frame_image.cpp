@@ -153,7 +153,7 @@ cv::Mat draw_frame_image(const cv::Mat& frame,
     cv::Mat part = image.rowRange(0, frame.rows);
     to_rgb(frame).copyTo(part);
     draw_matches(part, matches, inlier_mask, longest_px,
-                 [](const Eigen::Vector2d& uv) { return uv; });
+                 [&](const Eigen::Vector2d& uv) { return channel.map.lens.distort(uv); });
   }
   if (!channel.pixels.empty()) {
     cv::Mat part = image.rowRange(image.rows - channel_height_px, image.rows);

@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "geometry/radial_lens.hpp"
+
 namespace stemvo {
 
 /// Map from pixels of a channel (or of an image made from it) to pixels of the input frame, per
@@ -12,12 +14,13 @@ namespace stemvo {
 struct PixelMap {
   Eigen::Vector2d scale = Eigen::Vector2d::Ones();
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
+  RadialLens lens = {};  ///< the input frame's, taken out of its pixels
 
   [[nodiscard]] Eigen::Vector2d to_input(const Eigen::Vector2d& channel_uv) const {
-    return scale.cwiseProduct(channel_uv) + offset_px;
+    return lens.undistort(scale.cwiseProduct(channel_uv) + offset_px);
   }
   [[nodiscard]] Eigen::Vector2d from_input(const Eigen::Vector2d& input_uv) const {
-    return (input_uv - offset_px).cwiseQuotient(scale);
+    return (lens.distort(input_uv) - offset_px).cwiseQuotient(scale);
   }
 };
 

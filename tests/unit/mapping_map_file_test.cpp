@@ -66,7 +66,7 @@ TEST_F(MapFiles, SayWhatTheyAreInstead) {
   EXPECT_THAT(refusal("ply\nformat ascii"), HasSubstr("expected a map of stemvo, found another"));
   std::string other = bytes_of(small_map());
   other[14] = 9;
-  EXPECT_THAT(refusal(other), HasSubstr("expected a map of version 1, found version 9"));
+  EXPECT_THAT(refusal(other), HasSubstr("expected a map of version 2, found version 9"));
   EXPECT_THAT(message_of(read_map_file(folder_ / "nothing")), HasSubstr("nothing: cannot read"));
 }
 

@@ -16,7 +16,8 @@ void observe_run(int k,
                  const Eigen::Vector3d& step,
                  const std::vector<Eigen::Vector3d>& points,
                  const Camera& true_camera,
-                 SelfCalibration& calibration) {
+                 SelfCalibration& calibration,
+                 const Eigen::Vector2d& radial = Eigen::Vector2d::Zero()) {
   std::vector<Rigid3> path(1);
   for (int i = 1; i < kLength; ++i) {
     path.push_back(path.back() * Rigid3(so3_exp(turn(i)), step));
@@ -25,7 +26,8 @@ void observe_run(int k,
   for (int i = 0; i < kLength; ++i) {
     Keyframe keyframe{kLength * k + i, drive.pose(i), {}};
     for (const auto& [id, uv] : drive.observations[static_cast<std::size_t>(i)]) {
-      keyframe.points.push_back({id, uv});
+      const Eigen::Vector2d frame_uv = radial_lens(true_camera, radial).distort(uv);
+      keyframe.points.push_back({id, calibration.lens().undistort(frame_uv)});
     }
     const Camera before = calibration.camera();
     calibration.observe(keyframe, {});
@@ -37,13 +39,15 @@ void observe_run(int k,
 }
 
 /// Runs of a drive with turns, seen by the true camera.
-void drive_runs(const Camera& true_camera, SelfCalibration& calibration) {
+void drive_runs(const Camera& true_camera,
+                SelfCalibration& calibration,
+                const Eigen::Vector2d& radial = Eigen::Vector2d::Zero()) {
   for (int k = 0; k < kNumRuns; ++k) {
     const auto turn = [k](int i) {
       return Eigen::Vector3d(0.004 * (i % 3 - 1), k % 2 == 0 ? 0.05 : -0.04, 0.0);
     };
     observe_run(k, turn, {0.0, 0.0, 0.9}, DriveTracks(2, 0.0, static_cast<std::uint64_t>(k)).points,
-                true_camera, calibration);
+                true_camera, calibration, radial);
   }
 }
 
@@ -130,6 +134,26 @@ TEST_F(SelfCalibrationTest, ARightCameraIsKept) {
   EXPECT_EQ(calibration.camera().cx_px, truth_.cx_px);
   EXPECT_EQ(calibration.camera().cy_px, truth_.cy_px);
   EXPECT_EQ(calibration.camera().fx_px, truth_.fx_px);
+  EXPECT_TRUE(calibration.radial().isZero());
+}
+
+/// What KITTI's rectified images still have: 6 px at the sides.
+TEST_F(SelfCalibrationTest, FindsALensThatNobodyKnewOf) {
+  const Eigen::Vector2d radial(0.0165, -0.004);
+  SelfCalibration calibration(truth_, CameraRefinement::kPrincipalPoint);
+  drive_runs(truth_, calibration, radial);
+  const RadialLens lens = radial_lens(truth_, radial);
+  for (const double u_px : {0.0, 200.0, 1000.0, 1240.0}) {
+    const Eigen::Vector2d uv(u_px, 250.0);
+    EXPECT_LT((calibration.lens().undistort(lens.distort(uv)) - uv).norm(), 0.5) << u_px;
+  }
+}
+
+TEST(RadialLens, UndistortsWhatItDistorts) {
+  const RadialLens lens = radial_lens(kitti_camera(), {0.03, -0.01});
+  const Eigen::Vector2d corner(0.0, 0.0);
+  EXPECT_GT((lens.distort(corner) - corner).norm(), 5.0);
+  EXPECT_LT((lens.undistort(lens.distort(corner)) - corner).norm(), 1e-3);
 }
 
 /// However sure its runs are: as much is missed where all turns are to one side.
