@@ -2,6 +2,7 @@
 #include "dataset/frame_files.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <system_error>
 
@@ -171,16 +172,20 @@ Status add_ground_truth(FrameSource& frames,
     return fail(fmt::format("{}: expected a pose for each of {} images, found {} poses",
                             poses.string(), num_files, truth.poses.size()));
   }
-  const auto are_numbers = [](const std::vector<double>& times_s) {  // 0, 1, 2, .., as of frames
-    return !times_s.empty() && times_s.back() - times_s.front() + 1.0 == double(times_s.size());
+  const auto step_of = [](const std::vector<double>& times_s) {
+    const auto count = static_cast<double>(times_s.size());
+    return count > 1.0 ? (times_s.back() - times_s.front()) / (count - 1.0) : 0.0;
   };
-  if (truth.timestamps_s.size() == num_files && are_numbers(truth.timestamps_s) &&
-      !are_numbers(frames.timestamps_s)) {
-    return fail(poses.string() + ": expected times of poses, found numbers of frames");
+  const double step_s = step_of(truth.timestamps_s);
+  const double frames_s = step_of(frames.timestamps_s);
+  const auto matched = match_frames(truth, frames.range.begin, frames.timestamps_s, tolerance_s);
+  if (step_s > 0.0 && std::abs(step_s - frames_s) > 0.3 && (step_s == 1.0 || frames_s == 1.0) &&
+      (!matched || truth.timestamps_s.size() == num_files)) {
+    return fail(fmt::format("{}: expected steps as frames', {:g} s, found {:g}: numbers of frames?",
+                            poses.string(), frames_s, step_s));
   }
   add_line(frames.warnings, warn_of_spare_poses(truth, num_files));
-  STEMVO_TRY_GET(frames.ground_truth,
-                 match_frames(truth, frames.range.begin, frames.timestamps_s, tolerance_s));
+  STEMVO_TRY_GET(frames.ground_truth, matched);
   return {};
 }
 

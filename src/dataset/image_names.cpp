@@ -316,7 +316,7 @@ std::vector<double> count_frames(const std::vector<fs::path>& files,
     steps.push_back(steps.back() + (is_count ? rise / least : 1.0));
   }
   if (const double missing = steps.back() - static_cast<double>(rises.size()); missing > 0.0) {
-    warnings.push_back(fmt::format("{}: {} numbers are missing up to it, and take their time",
+    warnings.push_back(fmt::format("{}: missing up to it: {} numbers, which take their time",
                                    files.back().string(), missing));
   }
   return steps;

@@ -120,10 +120,8 @@ Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
     times.rows.push_back(row.time_s);
   }
   constexpr std::size_t kFew = 3;
-  const bool is_counted = std::ranges::adjacent_find(times.rows, [](double a, double b) {
-                            return b != a + 1.0;
-                          }) == times.rows.end();
-  if (is_counted && times.rows.size() >= kFew && times.rows[0] <= 1.0) {
+  const double last = times.rows.front() + static_cast<double>(times.rows.size()) - 1.0;
+  if (times.rows.size() >= kFew && times.rows[0] <= 1.0 && times.rows.back() == last) {
     times.note = fmt::format(
         "{}: times {:g}, {:g}, .. are taken for seconds; numbers of frames would be no times",
         file.string(), times.rows[0], times.rows[1]);

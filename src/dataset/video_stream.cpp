@@ -23,9 +23,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Whether an mp4 or mov asks to be mirrored, which OpenCV takes for a turn: by a track's matrix or
-/// by the film's, each of which undoes the other. Boxes that end before `end` are looked through:
-/// moov, in it mvhd and trak, in that tkhd.
+/// Whether an mp4 or mov asks to be mirrored, which OpenCV takes for a turn: by the film's matrix
+/// (moov, mvhd) or a track's (moov, trak, tkhd), not by both. Boxes end before `end`.
 bool is_mirrored(std::istream& file, std::int64_t end, int depth = 0) {
   bool is_film_mirrored = false;
   bool is_track_mirrored = false;
@@ -249,9 +248,8 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                   const FrameSourceRequest& request) {
   const std::string owner = without_secrets(request.sequence_dir.string());
   const FrameRangeRequest range = request.frames.value_or(FrameRangeRequest{});
-  const fs::path& camera_file = *request.camera_file;
-  STEMVO_TRY(check_size(stream->decoder().size, camera.camera, owner, camera_file));
-  STEMVO_TRY_GET(const FrameView view, view_of(camera.camera, camera_file));
+  STEMVO_TRY(check_size(stream->decoder().size, camera.camera, owner, *request.camera_file));
+  STEMVO_TRY_GET(const FrameView view, view_of(camera.camera, *request.camera_file));
   if (const auto& rate_hz = camera.rate_hz ? camera.rate_hz : request.rate_hz) {
     stream->set_counted_rate(*rate_hz);
   }
@@ -311,7 +309,7 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
     };
   }
   // The driver of a camera may give another size than it was asked for.
-  const auto read = [stream, owner, camera_file,
+  const auto read = [stream, owner, camera_file = *request.camera_file,
                      raw = camera.camera](std::size_t index) -> Expected<cv::Mat> {
     STEMVO_TRY_GET(const cv::Mat image, stream->read(index));
     if (!image.empty()) {

@@ -58,8 +58,7 @@ Eigen::Vector2d center_of(const Camera& camera) {
   return {2.0 * camera.cx_px / camera.width_px, 2.0 * camera.cy_px / camera.height_px};
 }
 
-/// By how much larger images the principal point is the middle of, where that is over `least` and
-/// alike in both directions; 1: of these, or of none.
+/// How much larger images the centre is the middle of, if over `least` and alike in both; else 1.
 double told_scale(const Camera& camera, double least) {
   const Eigen::Vector2d center = center_of(camera);
   const double scale = std::sqrt(center.prod());

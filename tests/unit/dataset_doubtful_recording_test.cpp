@@ -32,7 +32,7 @@ TEST_F(DoubtfulRecording, FramesThatAreMissingByTheirNumbersTakeTheirTime) {
   FrameSourceRequest dropped = write_images({"f_000010.png", "f_000011.png", "f_000015.png"});
   EXPECT_THAT(open_source(dropped)->timestamps_s, ElementsAre(0.0, near(0.1), near(0.5)));
   EXPECT_THAT(open_source(dropped)->warnings,
-              ElementsAre(HasSubstr("15.png: 3 numbers are missing")));
+              ElementsAre(HasSubstr("15.png: missing up to it: 3 numbers")));
   dropped.frames = FrameRangeRequest{1, std::nullopt};
   EXPECT_THAT(open_source(dropped)->timestamps_s, ElementsAre(near(0.1), near(0.5)));
   dropped.frames.reset();
@@ -40,7 +40,7 @@ TEST_F(DoubtfulRecording, FramesThatAreMissingByTheirNumbersTakeTheirTime) {
   EXPECT_THAT(open_source(dropped)->warnings, IsEmpty()) << "times are told";
   const auto every_tenth = open_source(write_images({"0.png", "10.png", "20.png", "40.png"}));
   EXPECT_THAT(every_tenth->timestamps_s, ElementsAre(0.0, near(0.1), near(0.2), near(0.4)));
-  EXPECT_THAT(every_tenth->warnings, ElementsAre(HasSubstr("40.png: 1 numbers are missing")));
+  EXPECT_THAT(every_tenth->warnings, ElementsAre(HasSubstr("missing up to it: 1")));
 }
 
 TEST_F(DoubtfulRecording, NumbersThatCountNoFramesAreCountedEvenly) {
@@ -104,17 +104,25 @@ TEST_F(DoubtfulRecording, ACentreOfImagesALittleLargerIsSaid) {
 
 TEST_F(DoubtfulRecording, NumbersOfFramesBesideTheTruthsTimesAreNamed) {
   FrameSourceRequest request = write_images({"1.png", "2.png", "3.png", "4.png"});
-  std::string counted;
-  for (int i = 0; i < 4; ++i) {
-    counted += fmt::format("{} 0 0 {} 0 0 0 1\n", i, i);
-  }
-  request.ground_truth = temp_.file("truth.txt", counted);
-  EXPECT_THAT(message_of(open_source(request)),
-              HasSubstr("truth.txt: expected times of poses, found numbers of frames"));
-  request.times = temp_.file("times.txt", "0\n1\n2\n3\n");
-  EXPECT_EQ(message_of(open_source(request)), "no error") << "seconds, or numbers in both";
-  request.ground_truth = temp_.file("truth.txt", "1305031102.1 0 0 0 0 0 0 1\n");
-  EXPECT_THAT(message_of(open_source(request)), HasSubstr("poses are of 1305031102.100 to"));
+  const auto error_with = [&](double first_s, double step_s, int count, const char* times) {
+    std::string poses;
+    for (int i = 0; i < count; ++i) {
+      poses += fmt::format("{:.4f} 0 0 {} 0 0 0 1\n", first_s + step_s * i, i);
+    }
+    request.ground_truth = temp_.file("truth.txt", poses);
+    request.times = temp_.file("times.txt", times);
+    return message_of(open_source(request));
+  };
+  constexpr const char* kNumbers = "0\n1\n2\n3\n";
+  constexpr const char* kSeconds = "0\n0.1\n0.2\n0.3\n";
+  EXPECT_THAT(error_with(0.0, 1.0, 4, kSeconds),
+              HasSubstr("truth.txt: expected steps as frames', 0.1 s, found 1: numbers"));
+  EXPECT_THAT(error_with(1305031102.0, 0.1, 9, kNumbers), HasSubstr("1 s, found 0.1: "));
+  EXPECT_THAT(error_with(0.0, 0.1, 4, kNumbers), HasSubstr("numbers of frames?"));
+  EXPECT_EQ(error_with(0.0, 0.1, 4, kSeconds), "no error");
+  EXPECT_EQ(error_with(0.0, 1.0, 4, kNumbers), "no error");
+  EXPECT_EQ(error_with(0.0, 0.1, 31, kNumbers), "no error") << "a frame a second";
+  EXPECT_THAT(error_with(1305031102.0, 0.1, 9, kSeconds), HasSubstr("poses are of 1305031102.000"));
 }
 
 }  // namespace
