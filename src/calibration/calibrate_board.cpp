@@ -183,7 +183,7 @@ Expected<BoardReport> calibrate_board(const BoardRequest& request, const RunProg
     report.warnings.push_back(fmt::format("fx is known to {:.0f} % only: the views hardly tell it",
                                           100.0 * fx.sigma / fx.value));
   }
-  constexpr double kMaxShared = 3e-4;  // of the image's width
+  constexpr double kMaxShared = 2e-4;  // of the image's width
   if (const double px = shared_error_px(report.views, report.fit.camera);
       px > kMaxShared * size.width) {
     report.warnings.push_back(fmt::format(
