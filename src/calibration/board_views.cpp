@@ -159,10 +159,7 @@ std::vector<std::string> empty_parts(const Cells& cells) {
 
 /// Bounds of what the views show the board as.
 struct Spread {
-  double right = 0.0;  ///< most tilt with the right side nearer: sine
-  double left = 0.0;
-  double lower = 0.0;
-  double upper = 0.0;
+  cv::Vec4d tilts;       ///< sines of the most, with the left, right, upper, lower side nearer
   double largest = 0.0;  ///< share of the image's width or height that the board takes
   double nearest_m = std::numeric_limits<double>::infinity();
   double farthest_m = 0.0;
@@ -179,10 +176,10 @@ Spread spread_of(const std::vector<BoardView>& views, const cv::Size& size) {
     const double sign = rotation(2, 2) < 0.0 ? -1.0 : 1.0;
     const double x = sign * rotation(0, 2);  // the board's normal, away from the camera
     const double y = sign * rotation(1, 2);
-    spread.right = std::max(spread.right, x);
-    spread.left = std::max(spread.left, -x);
-    spread.lower = std::max(spread.lower, y);
-    spread.upper = std::max(spread.upper, -y);
+    const double tilts[] = {-x, x, -y, y};
+    for (int i = 0; i < 4; ++i) {
+      spread.tilts[i] = std::max(spread.tilts[i], tilts[i]);
+    }
     const cv::Rect2f box = cv::boundingRect(view.points.in_image);
     spread.largest = std::max(
         {spread.largest, double{box.width} / size.width, double{box.height} / size.height});
@@ -230,11 +227,10 @@ std::vector<std::string> missing_views(const std::vector<BoardView>& views, cons
     missing.push_back(fmt::format("the board in the {} of the image", fmt::join(parts, ", ")));
   }
   const Spread spread = spread_of(views, size);
-  for (const auto& [tilt, side] :
-       {std::pair(spread.left, "left"), std::pair(spread.right, "right"),
-        std::pair(spread.upper, "upper"), std::pair(spread.lower, "lower")}) {
-    if (tilt < kMinTilt) {
-      missing.push_back(fmt::format("its {} side nearer, tilted by 20 to 45 degrees", side));
+  constexpr const char* kSides[] = {"left", "right", "upper", "lower"};
+  for (int i = 0; i < 4; ++i) {
+    if (spread.tilts[i] < kMinTilt) {
+      missing.push_back(fmt::format("its {} side nearer, tilted by 20 to 45 degrees", kSides[i]));
     }
   }
   if (spread.largest < kMinShare) {

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <cmath>
+#include <ranges>
 
 #include <fmt/format.h>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "calibration/board.hpp"
@@ -48,6 +51,23 @@ Status add_view(const Board& board,
     report.views.push_back({name, std::move(points)});
   }
   return {};
+}
+
+/// The part of the error that a corner shares with the next one, as noise does not: what no camera
+/// explains that is the same in all views.
+double shared_error_px(const std::vector<BoardView>& views, const Camera& camera) {
+  const cv::Matx33d k(camera.fx_px, 0, camera.cx_px, 0, camera.fy_px, camera.cy_px, 0, 0, 1);
+  double sum_px2 = 0.0;
+  double count = 0.0;
+  for (const BoardView& view : views | std::views::filter(&BoardView::is_used)) {
+    cv::Mat off;
+    cv::projectPoints(view.points.on_board, view.camera_from_board_r, view.camera_from_board_t, k,
+                      camera.distortion_coefficients, off);
+    off -= cv::Mat(view.points.in_image);
+    sum_px2 += off.rowRange(1, off.rows).dot(off.rowRange(0, off.rows - 1));
+    count += off.rows;
+  }
+  return std::sqrt(std::max(0.0, sum_px2 / count));
 }
 
 fs::path coverage_file(const BoardRequest& request) {
@@ -162,6 +182,13 @@ Expected<BoardReport> calibrate_board(const BoardRequest& request, const RunProg
   if (const FittedNumber& fx = report.fit.numbers.front(); fx.sigma > kMaxSigma * fx.value) {
     report.warnings.push_back(fmt::format("fx is known to {:.0f} % only: the views hardly tell it",
                                           100.0 * fx.sigma / fx.value));
+  }
+  constexpr double kMaxShared = 2e-4;  // of the image's width
+  if (const double px = shared_error_px(report.views, report.fit.camera);
+      px > kMaxShared * size.width) {
+    report.warnings.push_back(fmt::format(
+        "corners err alike by {:.2f} px, as no noise does: pictures of one zoom, a flat board?",
+        px));
   }
   report.missing = missing_views(report.views, size);
   STEMVO_TRY(write_files(request, size, report));

@@ -35,7 +35,7 @@ struct Format {
         width,        height, "resolution", "camera_model", intrinsics, "distortion_model",
         coefficients, body,   "rate_hz",    "camera_height"};
     if (is_of_matrices) {
-      keys.insert(keys.end(), {projection, "roi", "binning_x", "binning_y"});
+      keys.insert(keys.end(), {projection, "roi", "binning_x", "binning_y", "fisheye_model"});
     } else if (has_more_keys) {
       keys.push_back("timeshift_cam_imu");
     }
@@ -91,16 +91,16 @@ class Reader {
   Expected<CameraFile> read() {
     STEMVO_TRY(collect());
     CameraFile result;
-    result.warnings = warnings_;
     set_body(result.body_from_camera);
     set_size(result.camera);
     set_intrinsics(result.camera);
     set_distortion(result.camera);
     check_part(result.camera);
-    check_projection(result);
+    check_projection(result.camera);
     result.rate_hz = number("rate_hz", 1e-9, 1e5);
     result.camera_height_m = number("camera_height", 1e-9, 1000.0);
     result.imu_from_camera_s = number("timeshift_cam_imu", -10.0, 10.0).value_or(0.0);
+    result.warnings = warnings_;
     return status_ ? Expected<CameraFile>(result) : status_.error();
   }
 
@@ -125,8 +125,6 @@ class Reader {
       format_.width = Format().width;
       format_.height = Format().height;
     }
-    const YAML::Node fisheye = root["fisheye_model"];  // OpenCV's, in place of a name
-    is_fisheye_ = fisheye && fisheye.IsScalar() && fisheye.Scalar() != "0";
     const bool is_chain = format_.body == kKalibr.body;
     if (is_chain && root["cam1"]) {
       const YAML::Node topic = root["cam0"]["rostopic"];
@@ -293,9 +291,8 @@ class Reader {
   }
 
   /// ROS' P is the camera of rectified images, which have no distortion.
-  void check_projection(CameraFile& result) {
+  void check_projection(const Camera& camera) {
     const std::string& key = format_.projection;
-    const Camera& camera = result.camera;
     const auto numbers = readable_list(key);
     if (!status_ || !numbers || numbers->size() != 12) {
       return;
@@ -305,7 +302,7 @@ class Reader {
         Eigen::Array4d(p[0], p[5], p[2], p[6]) -
         Eigen::Array4d(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px);
     if (p[0] > 0.0 && is_distorted(camera) && !(off.abs() < 0.01).all()) {
-      result.warnings.push_back(fmt::format(
+      warnings_.push_back(fmt::format(
           "{}: taken for images as the sensor gives them ({} and {}); those that are rectified "
           "have intrinsics [{}, {}, {}, {}], of {}, and no distortion",
           file_.string(), format_.intrinsics, format_.coefficients, p[0], p[5], p[2], p[6], key));
@@ -319,9 +316,10 @@ class Reader {
     const bool has_none = format_.is_of_matrices && found &&
                           std::ranges::all_of(*found, [](double k) { return k == 0.0; });
     const bool is_unnamed = format_.is_of_matrices && scalar("distortion_model").empty();
+    const std::string fisheye = scalar("fisheye_model");  // OpenCV's, in place of a name
     std::string model =
         is_unnamed && (has_none || !has("distortion_model"))
-            ? (is_fisheye_ ? "fisheye" : "plumb_bob")
+            ? (!fisheye.empty() && fisheye != "0" ? "fisheye" : "plumb_bob")
             : choice("distortion_model", {"none", "radial-tangential", "radtan", "plumb_bob",
                                           "rational_polynomial", "equidistant", "fisheye"});
     const bool is_empty = has_none && found->empty();
@@ -340,6 +338,12 @@ class Reader {
                     : list(key, {4, 5, 8, 12},
                            "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3], maybe k4, k5, k6 and s1 to "
                            "s4 behind");
+    }
+    if (is_unnamed && fisheye.empty() && !has_none && numbers.size() == 4) {
+      warnings_.push_back(fmt::format(
+          "{}: {} without a model's name are taken for k1, k2, p1, p2; a fisheye's need "
+          "distortion_model: equidistant",
+          file_.string(), key));
     }
     if (status_) {
       std::ranges::copy(numbers, camera.distortion_coefficients.begin());
@@ -371,7 +375,6 @@ class Reader {
 
   std::filesystem::path file_;
   Format format_;
-  bool is_fisheye_ = false;
   std::vector<std::string> warnings_;
   std::map<std::string, YAML::Node> values_;  ///< of the camera's keys that are there
   Status status_;

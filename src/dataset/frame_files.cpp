@@ -2,11 +2,13 @@
 #include "dataset/frame_files.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <system_error>
 
 #include <fmt/format.h>
 
+#include "dataset/image_names.hpp"
 #include "odometry/check_frame.hpp"
 #include "try.hpp"
 
@@ -67,21 +69,6 @@ Expected<TimedRows<double>> find_times(const Listing& listing, const FrameSource
                             file->string(), num_images, read->rows.size()));
   }
   return read;
-}
-
-Expected<SharedKind> check_images(FrameSource& frames,
-                                  const fs::path& folder,
-                                  const fs::path& camera_file,
-                                  const Camera& camera) {
-  STEMVO_TRY_GET(const auto kind, vote_on_images(frames));
-  if (kind.size != cv::Size(camera.width_px, camera.height_px)) {
-    return fail(
-        fmt::format("{}: expected images of {}x{} pixels, as {} says, found {}x{}; "
-                    "give the camera file of that size",
-                    folder.string(), camera.width_px, camera.height_px, camera_file.string(),
-                    kind.size.width, kind.size.height));
-  }
-  return kind;
 }
 
 /// Without times: the camera file's, else the rate asked for, else 30, with a note.
@@ -185,10 +172,33 @@ Status add_ground_truth(FrameSource& frames,
     return fail(fmt::format("{}: expected a pose for each of {} images, found {} poses",
                             poses.string(), num_files, truth.poses.size()));
   }
+  const auto step_of = [](const std::vector<double>& times_s) {
+    const auto count = static_cast<double>(times_s.size());
+    return count > 1.0 ? (times_s.back() - times_s.front()) / (count - 1.0) : 0.0;
+  };
+  const double step_s = step_of(truth.timestamps_s);
+  const double frames_s = step_of(frames.timestamps_s);
+  const auto matched = match_frames(truth, frames.range.begin, frames.timestamps_s, tolerance_s);
+  if (step_s > 0.0 && std::abs(step_s - frames_s) > 0.3 && (step_s == 1.0 || frames_s == 1.0) &&
+      (!matched || truth.timestamps_s.size() == num_files)) {
+    return fail(fmt::format("{}: expected steps as frames', {:g} s, found {:g}: numbers of frames?",
+                            poses.string(), frames_s, step_s));
+  }
   add_line(frames.warnings, warn_of_spare_poses(truth, num_files));
-  STEMVO_TRY_GET(frames.ground_truth,
-                 match_frames(truth, frames.range.begin, frames.timestamps_s, tolerance_s));
+  STEMVO_TRY_GET(frames.ground_truth, matched);
   return {};
+}
+
+Status check_size(const cv::Size& found,
+                  const Camera& camera,
+                  const std::string& owner,
+                  const fs::path& camera_file) {
+  return camera.width_px == 0 || found == cv::Size(camera.width_px, camera.height_px)
+             ? Status()
+             : fail(fmt::format("{}: expected images of {}x{} pixels, as {} says, found {}x{}; "
+                                "give the camera file of that size",
+                                owner, camera.width_px, camera.height_px, camera_file.string(),
+                                found.width, found.height));
 }
 
 Expected<FrameView> view_of(const Camera& camera, const fs::path& camera_file) {
@@ -241,12 +251,18 @@ Expected<SharedKind> vote_on_images(FrameSource& frames) {
     });
   };
   const io::ImageKind most = *std::ranges::max_element(votes, {}, num_votes);
+  // A drive may begin in the dark: levels are those of images from all of it.
+  constexpr std::size_t kNumSamples = 10;
+  for (std::size_t i = 1; votes.front().used && i <= kNumSamples; ++i) {
+    votes.push_back(
+        io::read_image_kind(files[i * (files.size() - 1) / kNumSamples]).value_or(most));
+  }
   const io::Levels levels = io::used_levels(votes);
   if (levels != io::Levels()) {
     frames.warnings.push_back(
-        fmt::format("images of 16 bits: values from {} to {}, as in the first ones, are taken for "
+        fmt::format("images of 16 bits: values from {} to {}, as in {} of them, are taken for "
                     "black to white",
-                    levels.low, levels.high));
+                    levels.low, levels.high, votes.size()));
   }
   return SharedKind{most.size, most.is_color, levels};
 }
@@ -340,8 +356,9 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
   add_line(frames.notes, times.note);
   if (!has_times) {
     const double rate_hz = rate_of(camera_file, request, frames);
+    const std::vector<double> steps = count_frames(listing.files, frames.warnings);
     for (std::size_t i = 0; i < frames.timestamps_s.size(); ++i) {
-      frames.timestamps_s[i] = static_cast<double>(range.begin + i) / rate_hz;
+      frames.timestamps_s[i] = steps[range.begin + i] / rate_hz;
     }
   }
   if (const auto& truth = request.ground_truth ? request.ground_truth : listing.ground_truth) {
@@ -349,8 +366,8 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
                                 listing.files.size(), true));
   }
   add_line(frames.warnings, listing.warning);
-  STEMVO_TRY_GET(const auto kind,
-                 check_images(frames, listing.folder, *camera_path, camera_file.camera));
+  STEMVO_TRY_GET(const auto kind, vote_on_images(frames));
+  STEMVO_TRY(check_size(kind.size, camera_file.camera, listing.folder.string(), *camera_path));
   STEMVO_TRY_GET(const auto view, view_of(camera_file.camera, *camera_path));
   frames.kind = listing.kind;
   frames.name = listing.name;

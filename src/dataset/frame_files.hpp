@@ -75,6 +75,11 @@ namespace stemvo::dataset {
 /// A line where frames are turned as the container asks; else empty.
 [[nodiscard]] std::string warn_of_turn(const VideoStream& stream, const std::string& owner);
 
+/// Error: the images of `owner` are of another size than the camera file says, if it says one.
+[[nodiscard]] Status check_size(const cv::Size& found,
+                                const Camera& camera,
+                                const std::string& owner,
+                                const std::filesystem::path& camera_file);
 /// Error, naming the camera file: that of FrameView::create.
 [[nodiscard]] Expected<FrameView> view_of(const Camera& camera,
                                           const std::filesystem::path& camera_file);
@@ -122,7 +127,8 @@ struct SharedKind {
                                                  double tolerance_s);
 
 /// Intrinsics of camera `index` (0..3) from its row `PN:` (odometry and object benchmarks) or
-/// `P_rect_0N:` (raw data); the size stays zero. Errors: no such row; not 12 finite numbers; skew.
+/// `P_rect_0N:` (raw data); the size is that of `S_rect_0N:`, else zero. Errors: no row of the
+/// camera; other numbers than 12 and 2; skew.
 [[nodiscard]] Expected<Camera> read_kitti_camera(const std::filesystem::path& file, int index);
 
 /// The text of a calib.txt with other intrinsics in every projection row whose intrinsics are

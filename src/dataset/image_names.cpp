@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <regex>
@@ -117,17 +118,22 @@ Error one_time(const fs::path& given, const fs::path& file, const fs::path& othe
       (file.parent_path() / pattern).string()));
 }
 
+/// The least and the largest.
+std::pair<double, double> span_of(const std::set<std::string>& numbers) {
+  std::set<double> values;
+  for (const std::string& number : numbers) {
+    values.insert(std::strtod(number.c_str(), nullptr));
+  }
+  return {*values.begin(), *values.rbegin()};
+}
+
 /// Whole minutes: the numbers are seconds, which go on from one beginning to the next ("12-30-59",
 /// "12-31-00") in their usual step. `before`: one of the beginnings.
 bool are_seconds(const std::string& before, const std::set<std::string>& numbers) {
   static const std::regex kMinute("(.*[^0-9])?([01][0-9]|2[0-3])[^0-9]?[0-5][0-9][^0-9]");
   constexpr double kMinute_s = 60.0;
-  std::vector<double> seconds;
-  for (const std::string& number : numbers) {
-    seconds.push_back(std::strtod(number.c_str(), nullptr));
-  }
-  const auto [first, last] = std::ranges::minmax(seconds);
-  const double step_s = (last - first) / static_cast<double>(seconds.size() - 1);
+  const auto [first, last] = span_of(numbers);
+  const double step_s = (last - first) / static_cast<double>(numbers.size() - 1);
   return last < kMinute_s && kMinute_s + first - last < 1.5 * step_s &&
          std::regex_match(before, kMinute);
 }
@@ -196,14 +202,6 @@ std::string letters_of(std::string name) {
 bool are_of_one_time(const std::set<std::string>& a, const std::set<std::string>& b) {
   constexpr std::size_t kMin = 3;
   constexpr double kAlike = 0.8;
-  const auto span_of = [](const std::set<std::string>& numbers) {
-    std::vector<double> values;
-    for (const std::string& number : numbers) {
-      values.push_back(std::strtod(number.c_str(), nullptr));
-    }
-    const auto [first, last] = std::ranges::minmax(values);
-    return std::pair(first, last);
-  };
   const auto [first_a, last_a] = span_of(a);
   const auto [first_b, last_b] = span_of(b);
   const auto [fewer, more] = std::minmax(a.size(), b.size());
@@ -255,6 +253,30 @@ Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) 
   return {};
 }
 
+/// Error: dates with the year last that fall from one name to the next.
+Status check_dates(const std::vector<fs::path>& files, const fs::path& given) {
+  static const std::regex kDate(
+      "(.*[^0-9])?([0-3][0-9])[-_. ]?([0-3][0-9])[-_. ]?((19|20)[0-9]{2})([^0-9].*)?");
+  bool is_month_first = false;
+  std::string last;
+  for (const fs::path& file : files) {
+    const std::string stem = file.stem().string();
+    std::smatch found;
+    if (!std::regex_match(stem, found, kDate)) {
+      return {};
+    }
+    is_month_first = is_month_first || found[3] > "12";
+    const std::string date = found.format(is_month_first ? "$4$2$3" : "$4$3$2");
+    if (date < std::exchange(last, date)) {
+      return fail(fmt::format(
+          "{}: expected names in the order of time, as with the year before month and day, found "
+          "{}; a quoted pattern takes one day",
+          given.string(), file.filename().string()));
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 bool comes_before(std::string_view a, std::string_view b, bool has_decimals) {
@@ -270,8 +292,34 @@ void sort_images(std::vector<fs::path>& files) {
 }
 
 Status check_image_names(const std::vector<fs::path>& files, const fs::path& given) {
+  STEMVO_TRY(check_dates(files, given));
   STEMVO_TRY(check_numbers(files, given));
   return check_names(files, given);
+}
+
+std::vector<double> count_frames(const std::vector<fs::path>& files,
+                                 std::vector<std::string>& warnings) {
+  std::vector<double> rises;
+  bool is_count = files.size() > 1;
+  for (std::size_t i = 1; i < files.size(); ++i) {
+    const NameParts last = parts_of(files[i - 1]);
+    const NameParts next = parts_of(files[i]);
+    rises.push_back(std::strtod(next.number.c_str(), nullptr) -
+                    std::strtod(last.number.c_str(), nullptr));
+    is_count = is_count && next.before == last.before && next.behind == last.behind;
+  }
+  const double least = is_count ? std::ranges::min(rises) : 1.0;
+  is_count = is_count && 2 * std::ranges::count(rises, least) >= std::ssize(rises) &&
+             std::ranges::all_of(rises, [&](double r) { return std::fmod(r, least) == 0.0; });
+  std::vector<double> steps = {0.0};
+  for (const double rise : rises) {
+    steps.push_back(steps.back() + (is_count ? rise / least : 1.0));
+  }
+  if (const double missing = steps.back() - static_cast<double>(rises.size()); missing > 0.0) {
+    warnings.push_back(fmt::format("{}: missing up to it: {} numbers, which take their time",
+                                   files.back().string(), missing));
+  }
+  return steps;
 }
 
 std::string warn_of_names(const std::vector<fs::path>& files) {

@@ -16,7 +16,12 @@ namespace stemvo::dataset {
 /// So; the names tell whether they have decimals.
 void sort_images(std::vector<std::filesystem::path>& files);
 
-/// Error, of what was `given`: the files are of several cameras, or one picture twice.
+/// How many steps each frame is behind the first, by the numbers in the names where most follow
+/// each other, else evenly. A warning: numbers are missing.
+[[nodiscard]] std::vector<double> count_frames(const std::vector<std::filesystem::path>& files,
+                                               std::vector<std::string>& warnings);
+/// Error, of what was `given`: the files are of several cameras, or one picture twice, or dates put
+/// them in another order than time.
 [[nodiscard]] Status check_image_names(const std::vector<std::filesystem::path>& files,
                                        const std::filesystem::path& given);
 /// An image without a number among those that have one: a mask, a picture of the board. Empty:

@@ -61,14 +61,29 @@ Expected<Camera> to_camera(const Matrix34d& p) {
 
 Expected<Camera> read_kitti_camera(const std::filesystem::path& file, int index) {
   STEMVO_TRY_GET(const auto lines, read_lines(file, kMaxSettings_MB));
+  std::optional<Camera> camera;
+  cv::Size size;  // zero: the file says none
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (camera_of(lines[i]) == index) {
-      const Expected<Camera> camera = parse_projection(lines[i]).and_then(to_camera);
-      return camera ? camera : fail_at(file, i, camera.error());
+    Status row;
+    std::string_view rest = lines[i];
+    if (camera_of(rest) == index) {
+      const auto found = parse_projection(rest).and_then(to_camera);
+      row = found ? Status() : found.error();
+      camera = found.value_or(Camera());
+    } else if (take_word(rest) == fmt::format("S_rect_0{}:", index)) {
+      const auto sides = parse_numbers(rest, 2);
+      row = sides ? Status() : sides.error();
+      size = sides ? cv::Size2d((*sides)[0], (*sides)[1]) : cv::Size2d();
     }
+    STEMVO_TRY(row ? row : fail_at(file, i, row.error()));
   }
-  return fail(fmt::format("{}: expected a row 'P{}:' for image_{}, found none in {} lines",
-                          file.string(), index, index, lines.size()));
+  if (!camera) {
+    return fail(fmt::format("{}: expected a row 'P{}:' for image_{}, found none in {} lines",
+                            file.string(), index, index, lines.size()));
+  }
+  camera->width_px = size.width;
+  camera->height_px = size.height;
+  return *camera;
 }
 
 Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
@@ -105,10 +120,8 @@ Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
     times.rows.push_back(row.time_s);
   }
   constexpr std::size_t kFew = 3;
-  const bool is_counted = std::ranges::adjacent_find(times.rows, [](double a, double b) {
-                            return b != a + 1.0;
-                          }) == times.rows.end();
-  if (is_counted && times.rows.size() >= kFew && times.rows[0] <= 1.0) {
+  const double last = times.rows.front() + static_cast<double>(times.rows.size()) - 1.0;
+  if (times.rows.size() >= kFew && times.rows[0] <= 1.0 && times.rows.back() == last) {
     times.note = fmt::format(
         "{}: times {:g}, {:g}, .. are taken for seconds; numbers of frames would be no times",
         file.string(), times.rows[0], times.rows[1]);
@@ -197,6 +210,8 @@ std::optional<fs::path> find_ground_truth(const fs::path& absolute, const std::s
 
 Status set_images(const fs::path& calibration, bool is_color, FrameSource& frames) {
   STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames));
+  STEMVO_TRY(dataset::check_size(kind.size, frames.camera,
+                                 frames.files.front().parent_path().string(), calibration));
   frames.full_size = kind.size;
   frames.camera.width_px = kind.size.width;
   frames.camera.height_px = kind.size.height;
@@ -211,12 +226,8 @@ Status set_images(const fs::path& calibration, bool is_color, FrameSource& frame
 
 bool looks_like_kitti(const fs::path& folder) {
   std::error_code code;
-  for (const char* name : {"image_0", "image_1", "image_2", "image_3", "calib.txt"}) {
-    if (fs::exists(folder / name, code)) {
-      return true;
-    }
-  }
-  return false;
+  constexpr const char* kNames[] = {"image_0", "image_1", "image_2", "image_3", "calib.txt"};
+  return std::ranges::any_of(kNames, [&](auto name) { return fs::exists(folder / name, code); });
 }
 
 Expected<FrameSource> open_kitti(const fs::path& directory, const SequenceOptions& options) {

@@ -93,11 +93,8 @@ std::string name_part(const std::string& pattern) {
 }
 
 bool has_image_name(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return !file.filename().string().starts_with('.') &&
-         (extension == ".png" || extension == ".jpg" || extension == ".jpeg");
+  return fnmatch("[!.]*.@(png|jpg|jpeg)", file.filename().c_str(), FNM_EXTMATCH | FNM_CASEFOLD) ==
+         0;
 }
 
 }  // namespace

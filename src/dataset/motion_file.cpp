@@ -21,19 +21,17 @@ Expected<std::vector<double>> numbers_of(const TimedRow& row, const std::filesys
   return numbers ? numbers : fail_at(file, row.line, numbers.error());
 }
 
-/// Error: a comment of the file names a unit that its numbers are not read in, and not theirs.
-Status check_unit(const std::filesystem::path& file,
-                  const char* other,
-                  const std::string& expected) {
+/// Error: a comment of the file names `others`, as other units or columns, and not `own`.
+Status check_names(const std::filesystem::path& file,
+                   const char* others,
+                   const char* own,
+                   const char* expected) {
   STEMVO_TRY_GET(const auto lines, read_lines(file));
-  const std::regex name(other, std::regex::icase);
-  const std::size_t slash = expected.find('/');  // "rad s^-1", too
-  const std::regex own(
-      "(^|[^a-z])" + expected.substr(0, slash) + "[ /]+" + expected.substr(slash + 1),
-      std::regex::icase);
+  const std::regex name(others, std::regex::icase);
+  const std::regex own_name(own, std::regex::icase);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     std::smatch found;
-    if (std::regex_search(lines[i], found, name) && !std::regex_search(lines[i], own)) {
+    if (std::regex_search(lines[i], found, name) && !std::regex_search(lines[i], own_name)) {
       return fail_at(file, i, fail(fmt::format("expected {}, found {}", expected, found.str())));
     }
   }
@@ -57,8 +55,11 @@ Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file,
                                           const std::optional<std::pair<double, double>>& span_s) {
   constexpr double kSigmaShare = 0.02;
   constexpr double kMinSigma = 0.05;
-  STEMVO_TRY(
-      check_unit(file, "km *(/|p|per)? *h|kilomet[a-z]*|kph|mph|knots|miles|[cm]m */ *s", "m/s"));
+  STEMVO_TRY(check_names(file, "km *(/|p|per)? *h|kilomet[a-z]*|kph|mph|knots|miles|[cm]m */ *s",
+                         "(^|[^a-z])m[ /]+s", "m/s"));
+  STEMVO_TRY(check_names(file,
+                         "[^a-z]v(el|elocity)?[_. ]?y([^a-z]|$)|(sig|std)[a-z]*[^a-z]+(v|speed)",
+                         "^ $", "columns of time, speed [, sigma]"));
   STEMVO_TRY_GET(const auto found, read_timed_rows(file, {2, 3}, "a time, m/s and maybe a sigma",
                                                    {.span_s = span_s}));
   TimedRows<SpeedRow> speeds{.rows = {}, .note = found.note};
@@ -78,7 +79,12 @@ Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file,
 Expected<TimedRows<GyroRow>> read_gyro(const std::filesystem::path& file,
                                        const std::optional<std::pair<double, double>>& span_s) {
   constexpr double kMinStep_s = 0.9e-4;
-  STEMVO_TRY(check_unit(file, "deg|dps|\xC2\xB0", "rad/s"));
+  STEMVO_TRY(check_names(file, "deg|dps|\xC2\xB0", "(^|[^a-z])rad[ /]+s", "rad/s"));
+  // The first x is an acceleration's, or a y or z comes before it.
+  STEMVO_TRY(check_names(file,
+                         "^[^x]*[^a-z]((a|acc[a-z]*|lin[a-z]*)([_. ][a-z_. ]*)?x|"
+                         "([a-z]+[_.])*[wg]?[yz])([^a-z]|$)",
+                         "^ $", "columns of time, rates about x, y and z"));
   STEMVO_TRY_GET(
       const auto found,
       read_timed_rows(file, {4, 7}, "a time and rad/s about x, y and z",

@@ -23,9 +23,11 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Whether a track of an mp4 or mov asks to be mirrored, which OpenCV takes for a turn. Boxes that
-/// end before `end` are looked through: moov, trak in it, tkhd in it.
+/// Whether an mp4 or mov asks to be mirrored, which OpenCV takes for a turn: by the film's matrix
+/// (moov, mvhd) or a track's (moov, trak, tkhd), not by both. Boxes end before `end`.
 bool is_mirrored(std::istream& file, std::int64_t end, int depth = 0) {
+  bool is_film_mirrored = false;
+  bool is_track_mirrored = false;
   const auto read = [&file](int bytes) {
     std::int64_t number = 0;
     for (; bytes > 0; --bytes) {
@@ -39,39 +41,26 @@ bool is_mirrored(std::istream& file, std::int64_t end, int depth = 0) {
     file.read(name, sizeof(name));
     size = size == 1 ? read(8) : size == 0 ? end - at : size;
     if (!file || size < 8 || size > end - at) {
-      return false;
+      break;
     }
     constexpr std::string_view kNames[] = {"moov", "trak", "tkhd"};
-    if (std::string_view(name, sizeof(name)) == kNames[depth]) {
-      if (depth < 2) {
-        if (is_mirrored(file, at + size, depth + 1)) {
-          return true;
-        }
-      } else {
-        constexpr std::int64_t kTimes = 20;  // longer by 12 in version 1
-        const bool is_long = read(1) == 1;
-        file.seekg(3 + kTimes + (is_long ? 12 : 0) + 16, std::ios::cur);
-        double matrix[6];
-        for (double& number : matrix) {
-          number = static_cast<std::int32_t>(read(4));
-        }
-        return matrix[0] * matrix[4] < matrix[1] * matrix[3];
+    const std::string_view box(name, sizeof(name));
+    const bool is_film = depth == 1 && box == "mvhd";
+    if (is_film || (depth == 2 && box == kNames[2])) {
+      const std::int64_t times = is_film ? 16 : 20;  // longer by 12 in version 1
+      file.seekg(3 + (read(1) == 1 ? 12 : 0) + times + 16, std::ios::cur);
+      double matrix[6];
+      for (double& number : matrix) {
+        number = static_cast<std::int32_t>(read(4));
       }
+      (is_film ? is_film_mirrored : is_track_mirrored) =
+          matrix[0] * matrix[4] < matrix[1] * matrix[3];
+    } else if (box == kNames[depth]) {
+      is_track_mirrored = is_mirrored(file, at + size, depth + 1) || is_track_mirrored;
     }
     at += size;
   }
-  return false;
-}
-
-/// The camera's image: the driver of a camera may give another size than it was asked for.
-Status check_stream_size(const cv::Size& size, const Camera& camera, const std::string& owner) {
-  if (size != cv::Size(camera.width_px, camera.height_px)) {
-    return fail(
-        fmt::format("{}: expected frames of {}x{} pixels, as the camera file says, found "
-                    "{}x{}",
-                    owner, camera.width_px, camera.height_px, size.width, size.height));
-  }
-  return {};
+  return is_film_mirrored != is_track_mirrored;
 }
 
 /// Error: poses without times are fewer than the frames. The container's count may be wrong, so
@@ -113,10 +102,10 @@ Expected<std::shared_ptr<VideoStream>> open_file(const fs::path& file, const cv:
   }
   std::ifstream boxes(file, std::ios::binary);
   if (is_mirrored(boxes, static_cast<std::int64_t>(fs::file_size(file, code)))) {
-    return fail(fmt::format(
-        "{}: expected a video that players do not mirror, found a track that asks for it; "
-        "'ffmpeg -i IN OUT.mp4' writes frames as players show them",
-        file.string()));
+    return fail(
+        fmt::format("{}: expected a video that players do not mirror, found one that asks for it; "
+                    "'ffmpeg -i IN OUT.mp4' writes frames as players show them",
+                    file.string()));
   }
   return std::make_shared<VideoStream>(*std::move(decoder), file.string(), false);
 }
@@ -259,7 +248,7 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                   const FrameSourceRequest& request) {
   const std::string owner = without_secrets(request.sequence_dir.string());
   const FrameRangeRequest range = request.frames.value_or(FrameRangeRequest{});
-  STEMVO_TRY(check_stream_size(stream->decoder().size, camera.camera, owner));
+  STEMVO_TRY(check_size(stream->decoder().size, camera.camera, owner, *request.camera_file));
   STEMVO_TRY_GET(const FrameView view, view_of(camera.camera, *request.camera_file));
   if (const auto& rate_hz = camera.rate_hz ? camera.rate_hz : request.rate_hz) {
     stream->set_counted_rate(*rate_hz);
@@ -319,10 +308,12 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                           request.ground_truth_tolerance_s);
     };
   }
-  const auto read = [stream, owner, raw = camera.camera](std::size_t index) -> Expected<cv::Mat> {
+  // The driver of a camera may give another size than it was asked for.
+  const auto read = [stream, owner, camera_file = *request.camera_file,
+                     raw = camera.camera](std::size_t index) -> Expected<cv::Mat> {
     STEMVO_TRY_GET(const cv::Mat image, stream->read(index));
     if (!image.empty()) {
-      STEMVO_TRY(check_stream_size(image.size(), raw, owner));
+      STEMVO_TRY(check_size(image.size(), raw, owner, camera_file));
     }
     return image;
   };

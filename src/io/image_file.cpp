@@ -107,11 +107,8 @@ int exif_orientation(Bytes bytes) {
 
 void measure_levels(const cv::Mat& image, ImageKind& kind) {
   std::vector<std::size_t> counts(1U << 16U);
-  for (int v = 0; v < image.rows; ++v) {
-    for (const auto *at = image.ptr<std::uint16_t>(v), *end = at + image.cols * image.channels();
-         at != end; ++at) {
-      ++counts[*at];
-    }
+  for (const std::uint16_t value : cv::Mat_<std::uint16_t>(image.reshape(1))) {
+    ++counts[value];
   }
   const std::size_t few = image.total() * static_cast<std::size_t>(image.channels()) / 1000;
   const auto from_end = [&](const auto& first, const auto& last) {

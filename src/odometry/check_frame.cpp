@@ -58,21 +58,26 @@ Eigen::Vector2d center_of(const Camera& camera) {
   return {2.0 * camera.cx_px / camera.width_px, 2.0 * camera.cy_px / camera.height_px};
 }
 
-Status check_center(const Camera& camera, const std::string& owner) {
-  // From this factor on, alike in both directions, it is the middle of images of another size.
-  constexpr double kOtherSize = 1.25;
+/// How much larger images the centre is the middle of, if over `least` and alike in both; else 1.
+double told_scale(const Camera& camera, double least) {
   const Eigen::Vector2d center = center_of(camera);
   const double scale = std::sqrt(center.prod());
   const double log_scale = std::abs(std::log(scale));
+  const bool is_told =
+      log_scale > std::log(least) && std::abs(std::log(center.x() / center.y())) < 0.5 * log_scale;
+  return is_told && scale < 100.0 ? scale : 1.0;
+}
+
+Status check_center(const Camera& camera, const std::string& owner) {
+  const Eigen::Vector2d center = center_of(camera);
+  const double scale = told_scale(camera, 1.25);
   const bool is_inside = center.minCoeff() > 0.0 && center.maxCoeff() < 2.0;
-  if (is_inside && !(log_scale > std::log(kOtherSize) &&
-                     std::abs(std::log(center.x() / center.y())) < 0.5 * log_scale)) {
+  if (is_inside && scale == 1.0) {
     return {};
   }
   const std::string hint =
-      scale > 0.0 && scale < 100.0
-          ? fmt::format(": a calibration of images about {:.2g} times as large?", scale)
-          : "";
+      scale != 1.0 ? fmt::format(": a calibration of images about {:.2g} times as large?", scale)
+                   : "";
   return fail(
       fmt::format("{}: expected a principal point {} images of {}x{} pixels, found ({}, {}){}",
                   owner, is_inside ? "near the middle of" : "inside", camera.width_px,
@@ -132,14 +137,15 @@ std::string doubt_of(const Camera& camera) {
         "one direction more than in the other?",
         camera.fx_px, camera.fy_px);
   }
-  const Eigen::Vector2d center = center_of(camera);
-  if ((center.array() - 1.0).abs().maxCoeff() <= kMaxOff) {
+  const double scale = told_scale(camera, 1.07);
+  if (scale == 1.0 && (center_of(camera).array() - 1.0).abs().maxCoeff() <= kMaxOff) {
     return {};
   }
   return fmt::format(
       "the principal point ({:.1f}, {:.1f}) is far from the middle of images of {}x{} pixels: were "
-      "they cut, or is the calibration of another size?",
-      camera.cx_px, camera.cy_px, camera.width_px, camera.height_px);
+      "they cut, or is the calibration of {}?",
+      camera.cx_px, camera.cy_px, camera.width_px, camera.height_px,
+      scale == 1.0 ? "another size" : fmt::format("images about {:.2g} times as large", scale));
 }
 
 Status check_mask(const cv::Mat& mask, const Camera& camera) {

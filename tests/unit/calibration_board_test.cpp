@@ -35,7 +35,11 @@ class BoardCalibration : public ::testing::Test {
         cv::remap(image, shifted, smear(image.size()), cv::noArray(), cv::INTER_LINEAR);
         image = shifted;
       }
-      cv::imwrite((photos / fmt::format("{:02}.png", i)).string(), image);
+      const cv::Point2f middle(319.5F, 239.5F);
+      cv::Mat zoomed;
+      cv::warpAffine(image, zoomed, cv::getRotationMatrix2D(middle, 0.0, i % 2 == 0 ? 1.0 : zoom_),
+                     image.size(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+      cv::imwrite((photos / fmt::format("{:02}.png", i)).string(), zoomed);
     }
     return calibrate_board({photos, temp_ / "camera.yaml", parse_board(board).value(), board});
   }
@@ -75,6 +79,7 @@ class BoardCalibration : public ::testing::Test {
 
   TempFolder temp_;
   cv::RNG random_{7};
+  double zoom_ = 1.0;  ///< of every second picture
 };
 
 TEST_F(BoardCalibration, AChessboardTellsTheCameraThatTheFileHolds) {
@@ -105,6 +110,19 @@ TEST_F(BoardCalibration, BoardsOfMarkersInEveryLayout) {
     EXPECT_GE(report.views.size(), 8U);
     expect_true(report.fit, 0.005, 2.0);
     EXPECT_LT(report.fit.error_px, 0.35);
+    EXPECT_THAT(report.warnings, Not(Contains(HasSubstr("err alike"))));
+  }
+}
+
+TEST_F(BoardCalibration, PicturesOfTwoZoomsAreSaid) {
+  for (const double zoom : {1.0, 0.9, 0.8}) {
+    zoom_ = zoom;
+    const BoardReport report = calibrate("9x6:0.025", print_chessboard({9, 6}, 0.025), 14);
+    if (zoom == 1.0) {
+      EXPECT_THAT(report.warnings, IsEmpty());
+    } else {
+      EXPECT_THAT(report.warnings, ElementsAre(HasSubstr("of one zoom"))) << zoom;
+    }
   }
 }
 

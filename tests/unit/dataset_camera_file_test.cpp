@@ -286,6 +286,21 @@ TEST_F(CameraFileTest, FisheyesOfOpenCvAndRos) {
   expect_refused(text, {"camera.yaml:7: camera_matrix: expected data: [fx, 0, cx", "found 8"});
 }
 
+TEST_F(CameraFileTest, FourCoefficientsWithoutAModelMayBeAFisheyes) {
+  const auto warnings_of = [&](const std::string& flags, const std::string& lens) {
+    std::string text = kOpenCv;
+    text.replace(text.find("flags: 0"), 8, flags);
+    text.replace(text.find("0.001,\n       0.9"), 17, lens);
+    const auto file = read_camera_file(folder_.file("camera.yaml", text));
+    EXPECT_EQ(file->camera.distortion, Distortion::kRadialTangential) << text;
+    return file->warnings;
+  };
+  EXPECT_THAT(warnings_of("flags: 0", "0.001, 0.9"), IsEmpty());
+  EXPECT_THAT(warnings_of("flags: 0", "0.001"),
+              ElementsAre(HasSubstr("taken for k1, k2, p1, p2; a fisheye's need")));
+  EXPECT_THAT(warnings_of("fisheye_model: 0", "0.001"), IsEmpty()) << "the file says what it is";
+}
+
 TEST_F(CameraFileTest, TheBodyOfEuroc) {
   const std::string head =
       "resolution: [64, 48]\nintrinsics: [50, 50, 31.5, 23.5]\ndistortion_model: none\n";

@@ -144,6 +144,24 @@ TEST_F(KittiSequenceTest, CalibrationProblems) {
   EXPECT_THAT(open_error(), HasSubstr("calib.txt: cannot read: No such file"));
 }
 
+TEST_F(KittiSequenceTest, ImagesOfAnotherSizeThanTheRawCalibrationSaysAreRefused) {
+  const std::string camera = "P_rect_02: 100 0 4 5 0 101 3 0 0 0 1 0\n";
+  const auto error_with = [&](const std::string& text) {
+    write(folder_ / "calib.txt", text);
+    return open_error();
+  };
+  EXPECT_EQ(error_with("S_02: 9 7\nS_rect_02: 8.0e+00 6.0e+00\n" + camera), "no error");
+  EXPECT_EQ(error_with("S_rect_03: 9 7\n" + camera), "no error") << "another camera's";
+  for (const std::string& text :
+       {"S_rect_02: 9.0e+00 6.0e+00\n" + camera, camera + "S_rect_02: 9 6\n"}) {
+    EXPECT_THAT(error_with(text), AllOf(HasSubstr("image_2: expected images of 9x6 pixels, as"),
+                                        HasSubstr("calib.txt says, found 8x6")));
+  }
+  EXPECT_THAT(error_with("S_rect_02: 8\n" + camera),
+              HasSubstr("calib.txt:1: expected 2 numbers, found 1"));
+  EXPECT_THAT(error_with("S_rect_02: 1e20 -1\n" + camera), HasSubstr("expected images of"));
+}
+
 TEST_F(KittiSequenceTest, TimesProblems) {
   const fs::path file = folder_ / "times.txt";
   write(file, "0\n0.1\n0.2\n");

@@ -48,6 +48,33 @@ TEST_F(MotionFile, OtherUnitsThatACommentNamesAreRefused) {
   EXPECT_TRUE(read_gyro(write("# t, rad s^-1, temperature in deg C\n0 1 2 3\n")));
 }
 
+TEST_F(MotionFile, ColumnsInAnotherOrderAreRefused) {
+  const auto error_of = [&](const std::string& names) {
+    return message_of(read_gyro(write(fmt::format("# of the head\n# {}\n1 2 3 4 5 6 7\n", names))));
+  };
+  for (const char* names :
+       {"timestamp,ax,ay,az,gx,gy,gz", "t acc_x acc_y acc_z gyro_x gyro_y gyro_z", "time wz wy wx",
+        "time,wy,wx,wz", "time, acceleration x, y, z, rate x, y, z",
+        "timestamp [ns],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2],w_RS_S_x [rad s^-1]",
+        "time,linear_acceleration.x,linear_acceleration.y,linear_acceleration.z"}) {
+    EXPECT_THAT(error_of(names),
+                HasSubstr("motion.txt:2: expected columns of time, rates about x, y and z, found"))
+        << names;
+  }
+  for (const char* names :
+       {"timestamp,gx,gy,gz,ax,ay,az", "t wx wy wz", "time (s), rate about x, y, z (rad/s)",
+        "Stamp, angular_velocity.x, angular_velocity.y, angular_velocity.z, linear_acceleration.x",
+        "made by my phone, a gyro alone", "time in s, gyro x y z in rad/s, accelerometer x y z",
+        "timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y,w_RS_S_z,a_RS_S_x,a_RS_S_y,a_RS_S_z"}) {
+    EXPECT_EQ(error_of(names), "no error") << names;
+  }
+  EXPECT_THAT(message_of(read_gyro(write("# wx,wy,wz,time\n0.1,0.2,0.3,1\n0.1,0.2,0.3,2\n"))),
+              HasSubstr("motion.txt:3: expected a time after 0.1 s"));
+  EXPECT_THAT(speed_error("# time vx vy\n0 1 1\n"), HasSubstr("expected columns of time, speed"));
+  EXPECT_THAT(speed_error("# t, sigma, v\n0 1 1\n"), HasSubstr("expected columns of time, speed"));
+  EXPECT_TRUE(read_speeds(write("# time, speed, sigma of velocity\n0 1 1\n")));
+}
+
 TEST_F(MotionFile, EurocsTimesAreNanoseconds) {
   const auto gyro = read_gyro(
       write("#timestamp [ns],w_x [rad s^-1],w_y,w_z,a_x,a_y,a_z\n2500000000,0.1,0.2,0.3,9,8,7\n"));

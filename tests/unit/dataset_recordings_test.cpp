@@ -197,13 +197,15 @@ TEST_F(Recordings, AVideoIsTurnedAsPlayersDo) {
   FrameSourceRequest video = request(temp_ / "turned.mp4");
   test::write_video(video.sequence_dir, 25.0, {png, png});
   const std::string plain = read_file(video.sequence_dir);
-  const auto with_matrix = [&](std::array<signed char, 4> abcd) {
+  std::array<signed char, 4> of_movie = {1, 0, 0, 1};
+  const auto with_matrix = [&](const std::array<signed char, 4>& of_track) {
     std::string text = plain;
     constexpr std::size_t kPlaces[] = {0, 4, 12, 16};
-    for (std::size_t i = 0; i < 4; ++i) {
-      const char high = static_cast<char>(abcd[i] < 0 ? -1 : 0);  // numbers of 16.16 bits
-      const char number[] = {high, static_cast<char>(abcd[i]), 0, 0};
-      text.replace(plain.find("tkhd") + 44 + kPlaces[i], 4, number, 4);
+    for (std::size_t i = 0; i < 8; ++i) {
+      const signed char one = i < 4 ? of_track[i] : of_movie[i - 4];
+      const char number[] = {static_cast<char>(one < 0 ? -1 : 0), static_cast<char>(one), 0, 0};
+      const std::size_t box = i < 4 ? plain.find("tkhd") + 44 : plain.find("mvhd") + 40;
+      text.replace(box + kPlaces[i % 4], 4, number, 4);  // numbers of 16.16 bits
     }
     (void)temp_.file("turned.mp4", text);
   };
@@ -232,6 +234,12 @@ TEST_F(Recordings, AVideoIsTurnedAsPlayersDo) {
   expect_first(turned, 1);
   expect_first(picture, 0);  // the camera file's size decides
   with_matrix({-1, 0, 0, 1});
+  EXPECT_THAT(error_of(video), AllOf(HasSubstr("turned.mp4"), HasSubstr("mirror")));
+  of_movie = {1, 0, 0, -1};
+  cv::rotate(picture, turned, cv::ROTATE_180);
+  with_matrix({-1, 0, 0, 1});
+  expect_first(turned, 1);  // mirrored twice
+  with_matrix({1, 0, 0, 1});
   EXPECT_THAT(error_of(video), AllOf(HasSubstr("turned.mp4"), HasSubstr("mirror")));
 }
 

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: MIT
+// Recordings whose names, times, sizes or values would give a wrong path: refused, read right, or
+// said.
+#include "dataset/frame_files.hpp"
+#include "odometry/check_frame.hpp"
+#include "support/test.hpp"
+
+namespace stemvo {
+namespace {
+
+class DoubtfulRecording : public ::testing::Test {
+ protected:
+  /// The request of a folder that holds these images alone, 32x24 pixels, at 10 Hz.
+  FrameSourceRequest write_images(const std::vector<std::string>& names) const {
+    FrameSourceRequest request;
+    request.sequence_dir = temp_ / "drive";
+    fs::remove_all(request.sequence_dir);
+    fs::create_directories(request.sequence_dir);
+    for (const std::string& name : names) {
+      cv::imwrite((request.sequence_dir / name).string(), cv::Mat(24, 32, CV_8UC1, cv::Scalar(90)));
+    }
+    request.camera_file = temp_.file("camera.yaml",
+                                     "resolution: [32, 24]\nintrinsics: [30, 31, 15.5, 11.5]\n"
+                                     "distortion_model: none\nrate_hz: 10\n");
+    return request;
+  }
+  TempFolder temp_;
+};
+
+TEST_F(DoubtfulRecording, FramesThatAreMissingByTheirNumbersTakeTheirTime) {
+  const auto near = [](double s) { return ::testing::DoubleNear(s, 1e-9); };
+  FrameSourceRequest dropped = write_images({"f_000010.png", "f_000011.png", "f_000015.png"});
+  EXPECT_THAT(open_source(dropped)->timestamps_s, ElementsAre(0.0, near(0.1), near(0.5)));
+  EXPECT_THAT(open_source(dropped)->warnings,
+              ElementsAre(HasSubstr("15.png: missing up to it: 3 numbers")));
+  dropped.frames = FrameRangeRequest{1, std::nullopt};
+  EXPECT_THAT(open_source(dropped)->timestamps_s, ElementsAre(near(0.1), near(0.5)));
+  dropped.frames.reset();
+  dropped.times = temp_.file("times.txt", "0\n0.1\n0.2\n");
+  EXPECT_THAT(open_source(dropped)->warnings, IsEmpty()) << "times are told";
+  const auto every_tenth = open_source(write_images({"0.png", "10.png", "20.png", "40.png"}));
+  EXPECT_THAT(every_tenth->timestamps_s, ElementsAre(0.0, near(0.1), near(0.2), near(0.4)));
+  EXPECT_THAT(every_tenth->warnings, ElementsAre(HasSubstr("missing up to it: 1")));
+}
+
+TEST_F(DoubtfulRecording, NumbersThatCountNoFramesAreCountedEvenly) {
+  for (const auto& names : std::vector<std::vector<std::string>>{
+           {"1700000000033.png", "1700000000066.png", "1700000000100.png"},
+           {"12-30-58.png", "12-30-59.png", "12-31-00.png"},
+           {"5.1.png", "5.2.png", "5.4.png"},
+           {"1.png", "8.png", "30.png", "31.png"}}) {
+    const FrameSource source = open_source(write_images(names)).value();
+    EXPECT_NEAR(source.timestamps_s[2], 0.2, 1e-9) << names[0];
+    EXPECT_THAT(source.warnings, IsEmpty());
+  }
+}
+
+TEST_F(DoubtfulRecording, DaysBeforeMonthsAndYearsAreNotInTheOrderOfTime) {
+  for (const auto& names : std::vector<std::vector<std::string>>{
+           {"01-12-2026_00-00-01.png", "30-11-2026_23-59-59.png", "30-11-2026_23-59-58.png"},
+           {"drive 01.01.2027 0.0.1.png", "drive 31.12.2026 23.59.59.png"},
+           {"cam_31122026_235959.png", "cam_01012027_000000.png"},
+           {"12-31-2026_23-59-59.png", "01-01-2027_00-00-00.png"}}) {
+    FrameSourceRequest request = write_images(names);
+    EXPECT_THAT(message_of(open_source(request)),
+                AllOf(HasSubstr("expected names in the order of time"), HasSubstr("2026")))
+        << names[0];
+    request.sequence_dir /= "*.png";
+    EXPECT_THAT(open_source(request)->warnings, Contains(HasSubstr("in the order of time")));
+  }
+  for (const auto& names :
+       std::vector<std::vector<std::string>>{{"27-11-2026_12-00-01.png", "27-11-2026_12-00-02.png"},
+                                             {"27-11-2026_23-59-59.png", "28-11-2026_00-00-00.png"},
+                                             {"11-30-2026_23-59-59.png", "12-01-2026_00-00-00.png"},
+                                             {"2026-11-30_23-59-59.png", "2026-12-01_00-00-00.png"},
+                                             {"20261130_235959.png", "20261201_000000.png"},
+                                             {"00111999.png", "00112000.png"}}) {
+    EXPECT_EQ(message_of(open_source(write_images(names))), "no error") << names[0];
+  }
+}
+
+TEST_F(DoubtfulRecording, SixteenBitsAreStretchedByAllOfTheRecording) {
+  FrameSourceRequest request = write_images({});
+  for (int i = 0; i < 40; ++i) {  // out of a dark garage
+    cv::Mat image(24, 32, CV_16UC1);
+    cv::randu(image, 0, i < 10 ? 200 : 4000);
+    cv::imwrite((request.sequence_dir / fmt::format("{}.png", i)).string(), image);
+  }
+  const auto source = open_source(request);
+  cv::Mat counts = source->read(35).value() == 255;
+  EXPECT_LT(cv::countNonZero(counts), 24 * 32 / 50) << "saturated";
+  EXPECT_THAT(source->warnings, ElementsAre(HasSubstr("images of 16 bits: values from 0 to 4095")));
+}
+
+TEST_F(DoubtfulRecording, ACentreOfImagesALittleLargerIsSaid) {
+  Camera camera{718.9, 718.9, 607.2, 185.2, 1241, 376};
+  EXPECT_EQ(doubt_of(camera), "");
+  for (const double scale : {1.1, 1.15, 1.0 / 1.15}) {
+    camera.width_px = cvRound(scale * 1241);
+    camera.height_px = cvRound(scale * 376);
+    EXPECT_THAT(doubt_of(camera), HasSubstr(scale > 1.0 ? "images about 0.8" : "about 1.1 times"));
+  }
+}
+
+TEST_F(DoubtfulRecording, NumbersOfFramesBesideTheTruthsTimesAreNamed) {
+  FrameSourceRequest request = write_images({"1.png", "2.png", "3.png", "4.png"});
+  const auto error_with = [&](double first_s, double step_s, int count, const char* times) {
+    std::string poses;
+    for (int i = 0; i < count; ++i) {
+      poses += fmt::format("{:.4f} 0 0 {} 0 0 0 1\n", first_s + step_s * i, i);
+    }
+    request.ground_truth = temp_.file("truth.txt", poses);
+    request.times = temp_.file("times.txt", times);
+    return message_of(open_source(request));
+  };
+  constexpr const char* kNumbers = "0\n1\n2\n3\n";
+  constexpr const char* kSeconds = "0\n0.1\n0.2\n0.3\n";
+  EXPECT_THAT(error_with(0.0, 1.0, 4, kSeconds),
+              HasSubstr("truth.txt: expected steps as frames', 0.1 s, found 1: numbers"));
+  EXPECT_THAT(error_with(1305031102.0, 0.1, 9, kNumbers), HasSubstr("1 s, found 0.1: "));
+  EXPECT_THAT(error_with(0.0, 0.1, 4, kNumbers), HasSubstr("numbers of frames?"));
+  EXPECT_EQ(error_with(0.0, 0.1, 4, kSeconds), "no error");
+  EXPECT_EQ(error_with(0.0, 1.0, 4, kNumbers), "no error");
+  EXPECT_EQ(error_with(0.0, 0.1, 31, kNumbers), "no error") << "a frame a second";
+  EXPECT_THAT(error_with(1305031102.0, 0.1, 9, kSeconds), HasSubstr("poses are of 1305031102.000"));
+}
+
+}  // namespace
+}  // namespace stemvo
