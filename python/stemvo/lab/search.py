@@ -175,10 +175,9 @@ def judged(table, drives):
 
 def too_short(drives):
     """A line per road that no segment of t_rel fits into."""
-    for road, truth in {drive.road: drive.open().ground_truth for drive in drives}.items():
-        told = stemvo.evaluate(truth, truth)
-        if told["segments"] == 0:
-            yield f"{road}: {told['path_length_m']:.1f} m, too short for a segment of {told['segment_lengths_m'][0]:g} m: no t_rel and r_rel"
+    told = {(drive.road, drive.frames): stemvo.evaluate(truth, truth) for drive in drives for truth in [drive.open().ground_truth]}
+    return [f"{road}: {one['path_length_m']:.1f} m, too short for a segment of {one['segment_lengths_m'][0]:g} m: no t_rel and r_rel"
+            for (road, _), one in told.items() if one["segments"] == 0]
 
 
 def plan(count, layers, drives, jobs):
