@@ -21,12 +21,23 @@ nb::ndarray<nb::numpy, T> owned(std::unique_ptr<T[]> data,
   return {values, shape, owner};
 }
 
-std::string shape_of(const AnyArray& array) {
+/// "188x640 bool".
+std::string describe(const GivenArray& given) {
+  const AnyArray& array = given.array;
+  if (!array.is_valid()) {
+    return given.type;
+  }
   std::string text;
   for (std::size_t i = 0; i < array.ndim(); ++i) {
     text += fmt::format("{}{}", i == 0 ? "" : "x", array.shape(i));
   }
-  return text.empty() ? "one number" : text;
+  // By DLPack's code; rarer ones are of numbers that numpy has not.
+  constexpr const char* kKinds[] = {"int", "uint", "float", "opaque", "bfloat", "complex"};
+  const nb::dlpack::dtype type = array.dtype();
+  text += text.empty() ? "one " : " ";
+  return text + (type == nb::dtype<bool>()       ? "bool"
+                 : type.code < std::size(kKinds) ? fmt::format("{}{}", kKinds[type.code], type.bits)
+                                                 : fmt::format("other type of {} bits", type.bits));
 }
 
 void write_pose(const Rigid3& pose, double* to) {
@@ -50,6 +61,38 @@ void replace_word(std::string& message, std::string_view option, std::string_vie
       at += option.size();
     }
   }
+}
+
+/// Of an array HxW or HxWx3 of bytes.
+Expected<ImageView> pixels_of(const GivenArray& given, const char* name) {
+  const AnyArray& array = given.array;
+  const bool is_color = array.ndim() == 3;
+  if (std::max(array.shape(0), array.shape(1)) > std::size_t{kMaxImageSide_px}) {
+    return fail(fmt::format("{}: expected at most {} pixels a side, found {}", name,
+                            kMaxImageSide_px, describe(given)));
+  }
+  const auto height = static_cast<int>(array.shape(0));
+  const auto width = static_cast<int>(array.shape(1));
+  const std::int64_t channels = is_color ? 3 : 1;
+  const bool is_empty = height == 0 || width == 0;
+  if (!is_empty &&
+      ((width > 1 && array.stride(1) != channels) || (is_color && array.stride(2) != 1) ||
+       (height > 1 && array.stride(0) < width * channels))) {
+    return fail(
+        fmt::format("{}: expected pixels side by side in memory, found a view that flips, "
+                    "skips or swaps them (numpy.ascontiguousarray makes a copy)",
+                    name));
+  }
+  const int type = is_color ? CV_8UC3 : CV_8UC1;
+  if (is_empty) {
+    return ImageView{cv::Mat(height, width, type), is_color ? PixelOrder::kRgb : PixelOrder::kGray};
+  }
+  // cv::Mat has no constant pixels; the odometry only reads.
+  auto* const pixels = const_cast<std::uint8_t*>(static_cast<const std::uint8_t*>(array.data()));
+  const std::size_t step =
+      height > 1 ? static_cast<std::size_t>(array.stride(0)) : cv::Mat::AUTO_STEP;
+  return ImageView{cv::Mat(height, width, type, pixels, step),
+                   is_color ? PixelOrder::kRgb : PixelOrder::kGray};
 }
 
 }  // namespace
@@ -79,38 +122,24 @@ std::string in_python(std::string message) {
   return message;
 }
 
-Expected<ImageView> view_of(const AnyArray& array, const char* name) {
-  const bool is_color = array.ndim() == 3 && array.shape(2) == 3;
-  if (array.dtype() != nb::dtype<std::uint8_t>() || !(array.ndim() == 2 || is_color)) {
-    return fail(fmt::format("{}: expected HxW (gray) or HxWx3 (RGB) uint8, found {} of {} bits",
-                            name, shape_of(array), array.dtype().bits));
+Expected<ImageView> view_of(const GivenArray& given, const char* name) {
+  const AnyArray& array = given.array;
+  if (!array.is_valid() || array.dtype() != nb::dtype<std::uint8_t>() ||
+      !(array.ndim() == 2 || (array.ndim() == 3 && array.shape(2) == 3))) {
+    return fail(fmt::format("{}: expected an array HxW (gray) or HxWx3 (RGB) uint8, found {}", name,
+                            describe(given)));
   }
-  if (std::max(array.shape(0), array.shape(1)) > std::size_t{kMaxImageSide_px}) {
-    return fail(fmt::format("{}: expected at most {} pixels a side, found {}", name,
-                            kMaxImageSide_px, shape_of(array)));
-  }
-  const auto height = static_cast<int>(array.shape(0));
-  const auto width = static_cast<int>(array.shape(1));
-  const std::int64_t channels = is_color ? 3 : 1;
-  const bool is_empty = height == 0 || width == 0;
-  if (!is_empty &&
-      ((width > 1 && array.stride(1) != channels) || (is_color && array.stride(2) != 1) ||
-       (height > 1 && array.stride(0) < width * channels))) {
+  return pixels_of(given, name);
+}
+
+Expected<cv::Mat> mask_of(const GivenArray& given) {
+  const AnyArray& array = given.array;
+  if (!array.is_valid() || array.ndim() != 2 ||
+      !(array.dtype() == nb::dtype<std::uint8_t>() || array.dtype() == nb::dtype<bool>())) {
     return fail(
-        fmt::format("{}: expected pixels side by side in memory, found a view that flips, "
-                    "skips or swaps them (numpy.ascontiguousarray makes a copy)",
-                    name));
+        fmt::format("mask: expected an array HxW uint8 or bool, found {}", describe(given)));
   }
-  const int type = is_color ? CV_8UC3 : CV_8UC1;
-  if (is_empty) {
-    return ImageView{cv::Mat(height, width, type), is_color ? PixelOrder::kRgb : PixelOrder::kGray};
-  }
-  // cv::Mat has no constant pixels; the odometry only reads.
-  auto* const pixels = const_cast<std::uint8_t*>(static_cast<const std::uint8_t*>(array.data()));
-  const std::size_t step =
-      height > 1 ? static_cast<std::size_t>(array.stride(0)) : cv::Mat::AUTO_STEP;
-  return ImageView{cv::Mat(height, width, type, pixels, step),
-                   is_color ? PixelOrder::kRgb : PixelOrder::kGray};
+  return pixels_of(given, "mask").map([](const ImageView& view) { return view.pixels; });
 }
 
 ByteArray array_of(const cv::Mat& image) {
@@ -127,12 +156,13 @@ bool is_rotation(const Eigen::Matrix3d& matrix) {
   return (matrix.transpose() * matrix).isIdentity(1e-3) && matrix.determinant() > 0.0;
 }
 
-Expected<Trajectory> trajectory_of(const AnyArray& array, const std::string& name) {
-  const bool is_poses =
-      array.ndim() == 3 && (array.shape(1) == 3 || array.shape(1) == 4) && array.shape(2) == 4;
-  if (array.dtype() != nb::dtype<double>() || !is_poses || array.shape(0) == 0) {
-    return fail(fmt::format("{}: expected Nx4x4 float64, found {} of {} bits", name,
-                            shape_of(array), array.dtype().bits));
+Expected<Trajectory> trajectory_of(const GivenArray& given, const std::string& name) {
+  const AnyArray& array = given.array;
+  const bool is_poses = array.is_valid() && array.ndim() == 3 &&
+                        (array.shape(1) == 3 || array.shape(1) == 4) && array.shape(2) == 4;
+  if (!is_poses || array.dtype() != nb::dtype<double>() || array.shape(0) == 0) {
+    return fail(
+        fmt::format("{}: expected an array Nx4x4 float64, found {}", name, describe(given)));
   }
   Trajectory poses;
   const auto* const data = static_cast<const double*>(array.data());

@@ -26,10 +26,10 @@ namespace {
 
 using namespace nb::literals;
 using Path = std::filesystem::path;
-using PosesArgument = std::variant<Path, AnyArray>;
+using PosesArgument = std::variant<Path, GivenArray>;
 
 Expected<Trajectory> poses_of(const PosesArgument& given, const std::string& name) {
-  if (const auto* const array = std::get_if<AnyArray>(&given)) {
+  if (const auto* const array = std::get_if<GivenArray>(&given)) {
     return trajectory_of(*array, name);
   }
   return dataset::read_truth(std::get<Path>(given), std::nullopt).map([](const PoseFile& file) {
@@ -74,8 +74,8 @@ nb::dict evaluate_poses(const PosesArgument& estimate,
   return nb::cast<nb::dict>(nb::module_::import_("json").attr("loads")(json.dump()));
 }
 
-DoubleArray align_poses(const AnyArray& estimate,
-                        const AnyArray& truth,
+DoubleArray align_poses(const GivenArray& estimate,
+                        const GivenArray& truth,
                         const std::optional<std::vector<std::size_t>>& frames,
                         const std::string& align) {
   const Alignment alignment = value_or_raise(parse_alignment(align));
@@ -101,7 +101,7 @@ struct TrajectoryPair {
 };
 
 /// As many of the one as of the other.
-TrajectoryPair pair_of(const AnyArray& estimate, const AnyArray& truth) {
+TrajectoryPair pair_of(const GivenArray& estimate, const GivenArray& truth) {
   TrajectoryPair pair{value_or_raise(trajectory_of(estimate, "estimate")),
                       value_or_raise(trajectory_of(truth, "truth"))};
   if (pair.estimate.size() != pair.truth.size()) {
@@ -112,13 +112,13 @@ TrajectoryPair pair_of(const AnyArray& estimate, const AnyArray& truth) {
   return pair;
 }
 
-DoubleArray with_true_steps(const AnyArray& estimate, const AnyArray& truth) {
+DoubleArray with_true_steps(const GivenArray& estimate, const GivenArray& truth) {
   const TrajectoryPair pair = pair_of(estimate, truth);
   return array_of(rescale_steps(pair.estimate, pair.truth));
 }
 
-nb::dict errors_by_segment(const AnyArray& estimate,
-                           const AnyArray& truth,
+nb::dict errors_by_segment(const GivenArray& estimate,
+                           const GivenArray& truth,
                            const std::optional<std::vector<double>>& lengths_m,
                            std::size_t every) {
   const TrajectoryPair pair = pair_of(estimate, truth);
@@ -150,8 +150,8 @@ nb::dict errors_by_segment(const AnyArray& estimate,
   return result;
 }
 
-nb::dict dense_errors_of(const AnyArray& estimate,
-                         const AnyArray& truth,
+nb::dict dense_errors_of(const GivenArray& estimate,
+                         const GivenArray& truth,
                          std::size_t max_segments) {
   const TrajectoryPair pair = pair_of(estimate, truth);
   const DenseErrors errors = [&] {

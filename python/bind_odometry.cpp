@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Odometry: the library's asynchronous one in Python.
+#include <atomic>
 #include <filesystem>
 #include <mutex>
 #include <optional>
@@ -28,17 +29,17 @@ namespace {
 
 using namespace nb::literals;
 
-FrameHints hints_of(const std::optional<AnyArray>& mask,
-                    const std::optional<Eigen::Matrix3d>& rotation_hint) {
+FrameHints hints_of(const std::optional<GivenArray>& mask, const nb::object& rotation_hint) {
   FrameHints hints;
   if (mask) {
-    hints.mask = value_or_raise(view_of(*mask, "mask")).pixels;
+    hints.mask = value_or_raise(mask_of(*mask));
   }
-  if (rotation_hint) {
-    if (!is_rotation(*rotation_hint)) {
-      throw nb::value_error("rotation_hint: expected a rotation, found none");
+  if (!rotation_hint.is_none()) {
+    Eigen::Matrix3d rotation;
+    if (!nb::try_cast(rotation_hint, rotation) || !is_rotation(rotation)) {
+      throw nb::value_error("rotation_hint: expected a rotation, 3x3, found none");
     }
-    hints.prev_from_cur = Eigen::Quaterniond(*rotation_hint);
+    hints.prev_from_cur = Eigen::Quaterniond(rotation);
   }
   return hints;
 }
@@ -62,8 +63,7 @@ class PythonOdometry {
   }
 
  public:
-  using Mask = std::optional<AnyArray>;
-  using RotationHint = std::optional<Eigen::Matrix3d>;
+  using Mask = std::optional<GivenArray>;
 
   PythonOdometry(const Camera& camera, const Config& config, const cv::Mat& mask)
       : scale_source_(options::to_string(config.scale.source)),
@@ -74,12 +74,17 @@ class PythonOdometry {
     });
   }
 
-  [[nodiscard]] const std::string& scale_source() const { return scale_source_; }
+  /// As metrics.json has it.
+  [[nodiscard]] std::string scale_source() const {
+    return !has_ways_ || !is_measured_ ? scale_source_
+           : scale_source_ == "none"   ? "speed"
+                                       : scale_source_ + " and speed";
+  }
 
-  FrameResult process(const AnyArray& image,
+  FrameResult process(const GivenArray& image,
                       double timestamp,
                       const Mask& mask,
-                      const RotationHint& rotation_hint) {
+                      const nb::object& rotation_hint) {
     const ImageView view = value_or_raise(view_of(image, "image"));
     const FrameHints hints = hints_of(mask, rotation_hint);
     FrameResult result = in_turn([&]() -> Expected<FrameResult> {
@@ -94,10 +99,10 @@ class PythonOdometry {
     tell();
     return result;
   }
-  void push(const AnyArray& image,
+  void push(const GivenArray& image,
             double timestamp,
             const Mask& mask,
-            const RotationHint& rotation_hint) {
+            const nb::object& rotation_hint) {
     const ImageView view = value_or_raise(view_of(image, "image"));
     const FrameHints hints = hints_of(mask, rotation_hint);
     in_turn([&] { return push_frame(view, timestamp, hints); });
@@ -111,14 +116,17 @@ class PythonOdometry {
   int num_at_work() {
     return in_turn([&]() -> Expected<int> { return num_at_work_; });
   }
-  void add_speed(double time_s, double metres_per_s, double sigma) {
+  void add_speed(double time_s, double metres_per_s, std::optional<double> sigma) {
     in_turn([&] { return odometry_.add_speed(time_s, metres_per_s, sigma); });
+    has_ways_ = true;
   }
   void add_distance(double from_s, double to_s, double metres, double sigma) {
     in_turn([&] { return odometry_.add_distance(from_s, to_s, metres, sigma); });
+    has_ways_ = true;
   }
   void reset() {
     in_turn([&] { return check_idle("reset").and_then([&] { return odometry_.reset(); }); });
+    has_ways_ = is_measured_ = false;
   }
 
   AdjustedMap adjust_map(const std::vector<int>& covariance_of) const {
@@ -163,6 +171,7 @@ class PythonOdometry {
       return odometry_.finish().and_then([&] { return Expected<FrameResult>(result.error()); });
     }
     --num_at_work_;
+    is_measured_ = is_measured_ || result->value().scale_state == ScaleState::kMeasured;
     return result->value();
   }
   /// Hands over what was logged. The threads that log never wait for the interpreter's lock.
@@ -186,6 +195,8 @@ class PythonOdometry {
   }
 
   std::string scale_source_;
+  std::atomic<bool> has_ways_ = false;     ///< a speed or a distance was added
+  std::atomic<bool> is_measured_ = false;  ///< a frame's scale was
   std::mutex mutex_;
   int num_at_work_ = 0;
   std::mutex log_mutex_;
@@ -196,13 +207,13 @@ class PythonOdometry {
 void make_odometry(PythonOdometry* self,
                    const nb::object& camera,
                    const nb::object& options,
-                   const std::optional<AnyArray>& mask) {
+                   const std::optional<GivenArray>& mask) {
   const Config config = config_of(options);
   if (config.scale_choice == ScaleChoice::kGroundTruth) {
     throw nb::value_error(
         "scale.source: expected none, constant_speed or camera_height, found ground_truth");
   }
-  const cv::Mat given = mask ? value_or_raise(view_of(*mask, "mask")).pixels : cv::Mat();
+  const cv::Mat given = mask ? value_or_raise(mask_of(*mask)) : cv::Mat();
   if (const FrameSource* frames = frames_of(camera)) {
     new (self) PythonOdometry(frames->camera, dataset::with_camera_height(config, *frames),
                               mask ? given : frames->mask);
@@ -210,7 +221,7 @@ void make_odometry(PythonOdometry* self,
     const Camera& plain = nb::cast<const Camera&>(camera);
     new (self) PythonOdometry(plain, dataset::with_camera_height(config, {}), given);
   } else {
-    throw nb::type_error("camera: expected Camera, Recording or FrameView");
+    throw nb::value_error("camera: expected Camera, Recording or FrameView");
   }
 }
 
@@ -219,27 +230,30 @@ void make_odometry(PythonOdometry* self,
 void bind_odometry(nb::module_& module) {
   // stemvo.Odometry, which has run(), is made of it.
   nb::class_<PythonOdometry>(module, "Odometry")
-      .def("__init__", &make_odometry, "camera"_a, "options"_a = nb::none(),
-           "mask"_a.noconvert() = nb::none(),
+      .def("__init__", &make_odometry, "camera"_a, "options"_a = nb::none(), "mask"_a = nb::none(),
            nb::sig("def __init__(self, camera: Camera | Recording | FrameView, "
                    "options: Options | dict[str, typing.Any] | None = None, "
-                   "mask: numpy.typing.NDArray[numpy.uint8] | None = None) -> None"),
+                   "mask: numpy.typing.NDArray[numpy.uint8 | numpy.bool_] | None = None) -> None"),
            "A Recording or a FrameView brings its mask and its camera's height with it")
-      .def_prop_ro("scale_source", &PythonOdometry::scale_source,
-                   "scale.source; 'none': the path is up to scale")
-      .def("process", &PythonOdometry::process, "image"_a.noconvert(), "timestamp"_a,
-           "mask"_a.noconvert() = nb::none(), "rotation_hint"_a = nb::none(),
-           "HxW gray or HxWx3 RGB, uint8; seconds, each later than the last. mask: HxW uint8, 0 "
+      .def_prop_ro(
+          "scale_source", &PythonOdometry::scale_source,
+          "As in metrics.json; 'none': the path is up to scale; 'speed': metres by add_speed")
+      .def("process", &PythonOdometry::process, "image"_a.none(), "timestamp"_a,
+           "mask"_a = nb::none(), "rotation_hint"_a = nb::none(),
+           "HxW gray or HxWx3 RGB, uint8; seconds, each later than the last. mask: HxW uint8 or "
+           "bool, 0 "
            "where this frame shows what moves; rotation_hint: 3x3, since the last frame, from the "
            "camera now to the camera then")
-      .def("_push", &PythonOdometry::push, "image"_a.noconvert(), "timestamp"_a,
-           "mask"_a.noconvert() = nb::none(), "rotation_hint"_a = nb::none())
+      .def("_push", &PythonOdometry::push, "image"_a.none(), "timestamp"_a, "mask"_a = nb::none(),
+           "rotation_hint"_a = nb::none())
       .def("_take", &PythonOdometry::take)
       .def_prop_ro("_num_at_work", &PythonOdometry::num_at_work)
       .def("reset", &PythonOdometry::reset,
            "A new world: same network, camera and options; times may begin anew")
-      .def("add_speed", &PythonOdometry::add_speed, "timestamp"_a, "metres_per_s"_a, "sigma"_a,
-           "Of the camera along its path, as wheels or GPS tell it; metres from then on")
+      .def("add_speed", &PythonOdometry::add_speed, "timestamp"_a, "metres_per_s"_a,
+           "sigma"_a = nb::none(),
+           "Of the camera along its path, as wheels or GPS tell it; metres from then on. sigma: "
+           "None: 2 % of it, at least 0.05 m/s")
       .def("add_distance", &PythonOdometry::add_distance, "begin"_a, "end"_a, "metres"_a, "sigma"_a,
            "The camera's way between two times, likewise")
       .def("adjust_map", &PythonOdometry::adjust_map, "covariance_of"_a = std::vector<int>(),

@@ -52,30 +52,62 @@ void apply(Config& config, const nb::dict& values) {
   value_or_raise(validate(config));
 }
 
+/// `num_coefficients`: those that camera files may have.
+struct Lens {
+  const char* name;
+  std::array<std::ptrdiff_t, 4> num_coefficients;
+};
 /// By the enumerator's number.
-constexpr std::array<const char*, 3> kDistortions = {"none", "radial-tangential", "equidistant"};
+constexpr std::array<Lens, 3> kLenses = {
+    {{"none", {}}, {"radial-tangential", {4, 5, 8, 12}}, {"equidistant", {4, 4, 4, 4}}}};
+
+const Lens& lens_of(const Camera& camera) {
+  return kLenses.at(static_cast<std::size_t>(camera.distortion));
+}
 
 void set_distortion(Camera& camera,
                     const std::string& distortion,
                     const std::vector<double>& coefficients) {
-  const auto found = std::ranges::find(kDistortions, distortion);
-  if (found == kDistortions.end() || coefficients.size() > camera.distortion_coefficients.size()) {
+  const auto* const found = std::ranges::find(kLenses, distortion, &Lens::name);
+  if (found == kLenses.end() ||
+      std::ranges::count(found->num_coefficients, std::ssize(coefficients)) == 0) {
     throw nb::value_error(
-        fmt::format("distortion: expected one of {} with at most {} coefficients, "
-                    "found '{}' with {}",
-                    fmt::join(kDistortions, ", "), camera.distortion_coefficients.size(),
+        fmt::format("distortion: expected none, radial-tangential with 4, 5, 8 or 12 "
+                    "coefficients, or equidistant with 4, found '{}' with {}",
                     distortion, coefficients.size())
             .c_str());
   }
-  camera.distortion = static_cast<Distortion>(found - kDistortions.begin());
+  camera.distortion = static_cast<Distortion>(found - kLenses.begin());
   std::ranges::copy(coefficients, camera.distortion_coefficients.begin());
+}
+
+/// As few as set_distortion takes and as hold all that are not 0.
+std::vector<double> coefficients_of(const Camera& camera) {
+  const auto& all = camera.distortion_coefficients;
+  for (const std::ptrdiff_t count : lens_of(camera).num_coefficients) {
+    if (std::all_of(all.begin() + count, all.end(), [](double k) { return k == 0.0; })) {
+      return {all.begin(), all.begin() + count};
+    }
+  }
+  return {all.begin(), all.end()};
+}
+
+std::string describe(const Camera& camera) {
+  std::string text =
+      fmt::format("Camera(fx={}, fy={}, cx={}, cy={}, width={}, height={}", camera.fx_px,
+                  camera.fy_px, camera.cx_px, camera.cy_px, camera.width_px, camera.height_px);
+  if (camera.distortion != Distortion::kNone) {
+    text += fmt::format(", distortion='{}', coefficients=[{}]", lens_of(camera).name,
+                        fmt::join(coefficients_of(camera), ", "));
+  }
+  return text + ")";
 }
 
 void bind_camera(nb::module_& module) {
   nb::class_<Camera>(
       module, "Camera",
-      "Pinhole camera, in pixels; distortion is none, radial-tangential (k1 k2 p1 p2 k3 ..) "
-      "or equidistant (k1 k2 k3 k4)")
+      "Pinhole camera, in pixels; distortion is none, radial-tangential (k1 k2 p1 p2, maybe k3, "
+      "k4 k5 k6, s1 to s4 behind) or equidistant (k1 k2 k3 k4)")
       .def(
           "__init__",
           [](Camera* self, double fx, double fy, double cx, double cy, int width, int height,
@@ -91,30 +123,19 @@ void bind_camera(nb::module_& module) {
       .def_ro("cy", &Camera::cy_px)
       .def_ro("width", &Camera::width_px)
       .def_ro("height", &Camera::height_px)
-      .def_prop_ro(
-          "distortion",
-          [](const Camera& c) { return kDistortions.at(static_cast<std::size_t>(c.distortion)); })
-      .def_prop_ro("coefficients",
-                   [](const Camera& c) {
-                     return std::vector<double>(c.distortion_coefficients.begin(),
-                                                c.distortion_coefficients.end());
-                   })
-      .def("__repr__", [](const Camera& c) {
-        return fmt::format("Camera(fx={}, fy={}, cx={}, cy={}, width={}, height={})", c.fx_px,
-                           c.fy_px, c.cx_px, c.cy_px, c.width_px, c.height_px);
-      });
+      .def_prop_ro("distortion", [](const Camera& c) { return lens_of(c).name; })
+      .def_prop_ro("coefficients", &coefficients_of)
+      .def("__repr__", &describe);
 }
 
 void bind_options_class(nb::module_& module) {
   nb::class_<Config>(module, "Options", "The keys of `stemvo --dump-config`")
       .def(
           "__init__",
-          [](Config* self, const nb::dict& values) {
-            Config config;
-            apply(config, values);
-            new (self) Config(std::move(config));
-          },
-          "values"_a = nb::dict(), "E.g. {'stem.filter': 3}; ValueError: a bad key or value")
+          [](Config* self, const nb::object& values) { new (self) Config(config_of(values)); },
+          "values"_a = nb::dict(),
+          nb::sig("def __init__(self, values: dict[str, typing.Any] = {}) -> None"),
+          "E.g. {'stem.filter': 3}; ValueError: a bad key or value")
       .def_static(
           "driving",
           [](double height_m) {
@@ -142,7 +163,7 @@ Config config_of(const nb::object& options) {
   } else if (nb::isinstance<nb::dict>(options)) {
     apply(config, nb::cast<nb::dict>(options));
   } else if (!options.is_none()) {
-    throw nb::type_error("options: expected Options or a dict");
+    throw nb::value_error("options: expected Options or a dict");
   }
   return config;
 }

@@ -118,7 +118,7 @@ CameraView view_of_file(const Path& camera_file, const std::vector<std::string>&
   return made;
 }
 
-ByteArray apply(const CameraView& made, const AnyArray& image) {
+ByteArray apply(const CameraView& made, const GivenArray& image) {
   const ImageView given = value_or_raise(view_of(image, "image"));
   const cv::Size size = made.view.full_size();
   if (given.pixels.size() != size) {
@@ -186,7 +186,7 @@ void bind_recordings(nb::module_& module) {
             new (self) CameraView(view_of_file(camera_file, masks));
           },
           "camera_file"_a, "masks"_a = std::vector<std::string>())
-      .def("apply", &apply, "image"_a.noconvert(), "HxW gray or HxWx3 RGB, uint8; a new array")
+      .def("apply", &apply, "image"_a.none(), "HxW gray or HxWx3 RGB, uint8; a new array")
       .def_prop_ro("camera", [](const CameraView& v) { return v.frames.camera; })
       .def_prop_ro("camera_height_m", [](const CameraView& v) { return v.frames.camera_height_m; });
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Result, MapChanges, Keyframe, AdjustedMap: what an odometry gives.
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,6 +14,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "arrays.hpp"
+#include "report/data_files.hpp"
 #include "stemvo/map.hpp"
 
 namespace stemvo::python {
@@ -20,7 +22,34 @@ namespace {
 
 using namespace nb::literals;
 
+/// What a row of frames.csv holds between the frame's number and its errors.
+nb::list row_of(const FrameResult& r) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  constexpr const char* kModels[] = {"none", "homography", "essential"};  // by TwoViewModel
+  nb::list row;
+  const auto add = [&](const auto&... values) { (row.append(values), ...); };
+  const auto add_pose = [&](const Eigen::Vector3d& t, const Eigen::Quaterniond& q) {
+    add(t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+  };
+  add(r.time_s, std::string(to_string(r.state)), r.num_matches, r.num_inliers, r.homography_score,
+      r.fundamental_score, r.homography_ratio, kModels[static_cast<std::size_t>(r.model)],
+      r.times.stem_ms, r.times.features_ms, r.times.pose_ms, r.scale_sigma.value_or(kNone),
+      std::string(to_string(r.scale_state)), r.camera.fx_px, r.camera.cx_px, r.camera.cy_px);
+  const CameraSigma sigma = r.camera_sigma.value_or(CameraSigma{kNone, kNone, kNone});
+  add(sigma.fx_px, sigma.cx_px, sigma.cy_px,
+      r.recognized_frame == -1 ? kNone : static_cast<double>(r.recognized_frame),
+      r.map_from_world.scale);
+  add_pose(r.map_from_world.translation, r.map_from_world.rotation);
+  add(r.map_id, static_cast<int>(r.is_scale_new));
+  add_pose(r.world_from_camera.translation, r.world_from_camera.rotation);
+  for (const double variance : r.motion_covariance.diagonal()) {
+    add(variance);
+  }
+  return row;
+}
+
 void bind_result(nb::module_& module) {
+  module.attr("FRAMES_CSV_HEADER") = std::string(frames_csv_header());
   nb::class_<CameraSigma>(module, "CameraSigma", "Standard deviations of a camera, in pixels")
       .def_ro("fx", &CameraSigma::fx_px)
       .def_ro("cx", &CameraSigma::cx_px)
@@ -48,7 +77,9 @@ void bind_result(nb::module_& module) {
           [](const FrameResult& r) {
             return r.recognized_frame == -1 ? std::nullopt : std::optional(r.recognized_frame);
           },
-          "Whose place this one shows; below 0: of a map that was loaded; None: none recognized")
+          "Whose place this one shows; below -1: of a map that was loaded, whose last keyframe is "
+          "-2 "
+          "and the frame n before that -2 - n; None: none recognized")
       .def_prop_ro(
           "motion_covariance", [](const FrameResult& r) { return r.motion_covariance; },
           "6x6, of the motion since the last frame: x y z, then rotation, about this frame's axes")
@@ -74,6 +105,7 @@ void bind_result(nb::module_& module) {
       .def_prop_ro(
           "camera_sigma", [](const FrameResult& r) { return r.camera_sigma; },
           "None: the camera is not refined")
+      .def_prop_ro("csv_row", &row_of, "As in frames.csv, without the frame's number and errors")
       .def_prop_ro("problem", [](const FrameResult& r) { return r.problem; })
       .def("__repr__", [](const FrameResult& r) {
         const auto& at = r.world_from_camera.translation;

@@ -61,7 +61,10 @@ class PythonStem {
   [[nodiscard]] const StemInfo& info() const { return stem_.info(); }
 
   /// Filters [first, last) as an odometry of this camera's frames takes them.
-  Channels apply(const AnyArray& image, const Camera& camera, int first, std::optional<int> last) {
+  Channels apply(const GivenArray& image,
+                 const Camera& camera,
+                 int first,
+                 std::optional<int> last) {
     const ImageView view = value_or_raise(view_of(image, "image"));
     const int end = last.value_or(info().num_filters);
     if (first < 0 || first >= end || end > info().num_filters) {
@@ -96,7 +99,7 @@ class PythonChannelOdometry {
   }
 
   FrameResult process(const Channel* channel,
-                      const std::optional<AnyArray>& image,
+                      const std::optional<GivenArray>& image,
                       double timestamp) {
     if (!(timestamp > last_time_s_)) {
       throw nb::value_error(

@@ -52,7 +52,7 @@ class PatchTracker {
     }
   }
 
-  Image see(const AnyArray& array) {
+  Image see(const GivenArray& array) {
     const ImageView view = value_or_raise(view_of(array, "image"));
     const Channel channel = value_or_raise(stem_.apply(view.pixels, stem_.frame_zoom(resolution_)));
     return front_end_->prepare(contrast_.apply(channel), {});

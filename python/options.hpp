@@ -7,7 +7,7 @@
 
 namespace stemvo::python {
 
-/// The configuration of Options, a dict of keys and values, or None: the defaults. TypeError,
+/// The configuration of Options, a dict of keys and values, or None: the defaults.
 /// ValueError: of none.
 [[nodiscard]] Config config_of(const nanobind::object& options);
 

@@ -41,13 +41,16 @@ using Log = std::function<void(LogLevel level, const std::string& line)>;
 /// one that was moved from, what can fail is an Error and the rest is empty.
 class OdometryHandle {
  public:
-  /// The camera's speed along its path, from wheels, GPS and the like, 1-sigma of m/s; its sign
-  /// does not count. Lengths are metres from then on, with the road or without. Speeds are joined
-  /// by straight lines where they are at most 1.5 s apart, and count for frames at their times:
-  /// from the next frame on, up to half a minute late or ahead. Their errors are taken for
-  /// independent of each other. Errors: scale.source constant_speed; numbers that are not finite; a
-  /// time that is not after the last speed's; a sigma that is not above 0.
-  [[nodiscard]] Status add_speed(double time_s, double metres_per_s, double sigma);
+  /// The camera's speed along its path, from wheels, GPS and the like, 1-sigma of m/s (without one:
+  /// 2 % of the speed, at least 0.05 m/s); its sign does not count. Lengths are metres from then
+  /// on, with the road or without. Speeds are joined by straight lines where they are at most 1.5 s
+  /// apart, and count for frames at their times: from the next frame on, up to half a minute late
+  /// or ahead. Their errors are taken for independent of each other. Errors: scale.source
+  /// constant_speed; numbers that are not finite; a time that is not after the last speed's; a
+  /// sigma that is not above 0.
+  [[nodiscard]] Status add_speed(double time_s,
+                                 double metres_per_s,
+                                 std::optional<double> sigma = std::nullopt);
   /// The way of the camera between two times, likewise; 1-sigma in metres. Errors: likewise, and a
   /// time that is not after its beginning, or the end of the last; a distance below 0.
   [[nodiscard]] Status add_distance(double from_s, double to_s, double metres, double sigma);

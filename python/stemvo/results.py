@@ -8,9 +8,7 @@ from typing import Any
 
 from . import _core
 
-NUMBERS = ("timestamp", "state", "is_measured", "num_matches", "num_inliers", "scale_state", "scale_sigma", "map_id", "is_scale_new", "recognized_frame")
-
-
+COLUMNS = _core.FRAMES_CSV_HEADER.strip().split(",")[:-2]  # without errors
 MAPS = (_core.Keyframe, _core.MapChanges, _core.AdjustedKeyframe, _core.AdjustedMap)
 
 
@@ -75,14 +73,10 @@ copyreg.pickle(_core.Camera, _reduce_camera)
 
 
 def to_dataframe(results: Iterable[Any]) -> Any:
-    """A pandas.DataFrame with a row per result: its numbers, and x, y, z of the camera in the world."""
+    """A pandas.DataFrame with the columns of frames.csv (docs/results.md) but for errors, and is_measured: a row per result, counted from 0."""
     import pandas
 
-    rows = []
-    for result in results:
-        x, y, z = (float(value) for value in result.world_from_camera[:3, 3])
-        rows.append({name: getattr(result, name) for name in NUMBERS} | {"x": x, "y": y, "z": z})
-    return pandas.DataFrame(rows, columns=[*NUMBERS, "x", "y", "z"])
+    return pandas.DataFrame([[frame, *result.csv_row, result.is_measured] for frame, result in enumerate(results)], columns=[*COLUMNS, "is_measured"])
 
 
 def plot(results: Iterable[Any], truth: Any = None, ax: Any = None) -> Any:

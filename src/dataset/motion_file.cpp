@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "odometry/frame_clock.hpp"
+#include "odometry/way.hpp"
 #include "stemvo/rigid3.hpp"
 #include "try.hpp"
 
@@ -53,8 +54,6 @@ Eigen::Vector3d rate_at(const std::vector<GyroRow>& rows, double time_s) {
 
 Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file,
                                           const std::optional<std::pair<double, double>>& span_s) {
-  constexpr double kSigmaShare = 0.02;
-  constexpr double kMinSigma = 0.05;
   STEMVO_TRY(check_names(file, "km *(/|p|per)? *h|kilomet[a-z]*|kph|mph|knots|miles|[cm]m */ *s",
                          "(^|[^a-z])m[ /]+s", "m/s"));
   STEMVO_TRY(check_names(file,
@@ -65,8 +64,7 @@ Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file,
   TimedRows<SpeedRow> speeds{.rows = {}, .note = found.note};
   for (const TimedRow& row : found.rows) {
     STEMVO_TRY_GET(const auto numbers, numbers_of(row, file));
-    const double sigma =
-        numbers.size() > 1 ? numbers[1] : std::max(kMinSigma, kSigmaShare * std::abs(numbers[0]));
+    const double sigma = numbers.size() > 1 ? numbers[1] : usual_speed_sigma(numbers[0]);
     if (!(sigma > 0.0)) {
       return fail(fmt::format("{}: expected a sigma above 0 at {} s, found {}", file.string(),
                               row.time_s, sigma));

@@ -25,8 +25,8 @@ struct GyroRow {
   Eigen::Vector3d rad_per_s = Eigen::Vector3d::Zero();
 };
 
-/// Rows `time, m/s` or `time, m/s, sigma`, as read_timed_rows says. A row without a sigma has 2 %
-/// of its speed, and at least 0.05 m/s. Errors: its; a sigma that is not above 0. `span_s`: first
+/// Rows `time, m/s` or `time, m/s, sigma`, as read_timed_rows says. A row without a sigma has
+/// add_speed's own. Errors: its; a sigma that is not above 0. `span_s`: first
 /// and last time of the frames, where they are known.
 [[nodiscard]] Expected<TimedRows<SpeedRow>> read_speeds(
     const std::filesystem::path& file,

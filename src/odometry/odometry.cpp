@@ -217,7 +217,7 @@ void OdometryHandle::set_log(Log log) {
   }
 }
 
-Status OdometryHandle::add_speed(double time_s, double metres_per_s, double sigma) {
+Status OdometryHandle::add_speed(double time_s, double metres_per_s, std::optional<double> sigma) {
   STEMVO_TRY(check_in_use(impl_));
   const std::lock_guard lock(impl_->ways_mutex);
   return impl_->ways.add_speed(time_s, metres_per_s, sigma);

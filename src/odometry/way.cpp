@@ -57,13 +57,20 @@ constexpr double kMinWaySigmas = 3.0;
 
 }  // namespace
 
-Status WayInput::add_speed(double time_s, double metres_per_s, double sigma) {
+double usual_speed_sigma(double metres_per_s) {
+  constexpr double kShare = 0.02;
+  constexpr double kMin = 0.05;
+  return std::max(kMin, kShare * std::abs(metres_per_s));
+}
+
+Status WayInput::add_speed(double time_s, double metres_per_s, std::optional<double> given_sigma) {
   STEMVO_TRY(check_source(source_));
   STEMVO_TRY(check_time("speed", time_s, last_speed_ ? last_speed_->time_s : kNever_s));
-  STEMVO_TRY(check_sigma("speed", sigma));
   if (!std::isfinite(metres_per_s)) {
     return fail(fmt::format("speed: expected a number of m/s, found {}", metres_per_s));
   }
+  const double sigma = given_sigma.value_or(usual_speed_sigma(metres_per_s));
+  STEMVO_TRY(check_sigma("speed", sigma));
   const Speed now{time_s, std::abs(metres_per_s), sigma};
   if (last_speed_ && time_s - last_speed_->time_s <= kMaxGap_s) {
     // Each speed counts in two ways: with half of its error in each, their errors would pass for

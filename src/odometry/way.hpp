@@ -28,13 +28,18 @@ struct Way {
   Kind kind = Kind::kDistance;
 };
 
+/// Of a speed of wheels that nobody told the sigma of.
+[[nodiscard]] double usual_speed_sigma(double metres_per_s);
+
 /// Speeds and distances as a caller gives them, checked, made ways, and kept for the next frame.
 class WayInput {
  public:
   explicit WayInput(ScaleSource source) : source_(source) {}
 
   /// Errors as Odometry::add_speed and add_distance; nothing changes then.
-  [[nodiscard]] Status add_speed(double time_s, double metres_per_s, double sigma);
+  [[nodiscard]] Status add_speed(double time_s,
+                                 double metres_per_s,
+                                 std::optional<double> given_sigma = std::nullopt);
   [[nodiscard]] Status add_distance(double from_s, double to_s, double metres, double sigma);
   /// For the frame of this time: those given since the last call.
   [[nodiscard]] std::vector<Way> take(double time_s);

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Results as a table, as a picture, and between processes."""
 
+import os
 import pickle
 import subprocess
 import sys
 
 import matplotlib.pyplot
 import numpy as np
+import pandas
 import pytest
 import stemvo
 
@@ -50,10 +52,22 @@ def test_maps_are_pickled_too(seen):
 def test_a_table_has_a_row_per_result(seen):
     _, results = seen
     table = stemvo.to_dataframe(results)
-    assert list(table.timestamp) == pytest.approx([0.1 * k for k in range(16)])
+    assert list(table.timestamp_s) == pytest.approx([0.1 * k for k in range(16)])
     assert list(table.state) == [result.state for result in results]
     np.testing.assert_array_equal(table[["x", "y", "z"]], [result.world_from_camera[:3, 3] for result in results])
     assert list(stemvo.to_dataframe([]).columns) == list(table.columns)
+
+
+def test_a_table_has_the_columns_of_frames_csv(tmp_path):
+    program = os.environ["STEMVO_PROGRAM"]
+    for words in (["synth", tmp_path, "--frames", "12", "--width", "310", "--height", "94"], ["run", tmp_path / "sequences/00", "--out", tmp_path / "result"]):
+        subprocess.run([program, *words], check=True, capture_output=True)
+    recording = stemvo.read_recording(tmp_path / "sequences/00")
+    table, written = stemvo.to_dataframe(pickle.loads(pickle.dumps(list(stemvo.Odometry(recording).run(recording))))), pandas.read_csv(tmp_path / "result/frames.csv", keep_default_na=False, na_values="")
+    assert list(table.columns) == [*written.columns[:-2], "is_measured"]
+    for name in written.columns[:-2]:
+        if not name.endswith("_ms"):
+            pandas.testing.assert_series_equal(table[name], written[name], check_dtype=False, rtol=1e-5, atol=0.005 if name.endswith("_px") else 6e-4 if name[0] in "sr" else 1e-9)
 
 
 def test_a_picture_has_the_path_and_the_truth(seen):

@@ -3,6 +3,7 @@
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -68,6 +69,12 @@ def test_shards_together_are_the_whole(drive, tmp_path):
 def test_held_out_drives_judge(drive, tmp_path):
     done = CliRunner().invoke(main, arguments(drive, tmp_path, "--frames", "0:40", "--held-out", drive, "--held-out-frames", "20:60"))
     assert done.exit_code == 0 and "held out: first (1): t_rel" in done.output, done.output
+
+
+def test_a_drive_too_short_for_a_segment_is_said(drive, tmp_path):
+    done = CliRunner().invoke(main, arguments(drive, tmp_path, "--frames", "0:8"))
+    assert done.exit_code == 0 and re.search(r"^00: \d\.\d m, too short for a segment of 10 m: no t_rel and r_rel$", done.output, re.MULTILINE), done.output
+    assert "None" not in done.output
 
 
 @pytest.mark.parametrize(("more", "message"), [(["--shard", "2/2"], "--shard: expected I/N"), (["--model", "default"], "'default' again"), (["--set", "features.nothing=3"], "features.nothing")])

@@ -143,6 +143,15 @@ TEST(WayScale, TheLastSpeedIsTheFirstGuess) {
   EXPECT_EQ(drive.result.scale_state, ScaleState::kNone);
 }
 
+// As a file of speeds has it: 2 %, at least 0.05 m/s.
+TEST(WayInput, ASpeedWithoutASigmaHasTheUsualOne) {
+  for (const auto& [speed, sigma] : {std::pair(-10.0, 0.2), std::pair(1.0, 0.05)}) {
+    WayInput ways(ScaleSource::kNone);
+    ASSERT_TRUE(ways.add_speed(0.0, speed));
+    EXPECT_DOUBLE_EQ(ways.take(1.0).at(0).sigma_m, sigma);
+  }
+}
+
 TEST(WayInput, RefusesWhatIsNoMeasurementAndSaysWhy) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   WayInput ways(ScaleSource::kNone);

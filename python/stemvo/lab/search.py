@@ -173,6 +173,13 @@ def judged(table, drives):
     return lines
 
 
+def too_short(drives):
+    """A line per road that no segment of t_rel fits into."""
+    told = {(drive.road, drive.frames): stemvo.evaluate(truth, truth) for drive in drives for truth in [drive.open().ground_truth]}
+    return [f"{road}: {one['path_length_m']:.1f} m, too short for a segment of {one['segment_lengths_m'][0]:g} m: no t_rel and r_rel"
+            for (road, _), one in told.items() if one["segments"] == 0]
+
+
 def plan(count, layers, drives, jobs):
     """Cost of so many filters over these drives, by the speed of a few here."""
     drive, layer = drives[0], layers[0]
@@ -191,7 +198,7 @@ def plan(count, layers, drives, jobs):
 def write_results(out, table):
     import pandas
 
-    frame = pandas.DataFrame(table)
+    frame = pandas.DataFrame(table).fillna(np.nan)
     frame.to_csv(out / "filters.csv", index=False, float_format="%.4f")
     shown = [name for name in ("model", "layer", "filter", "features", "status", "t_rel_percent", "r_rel_deg_per_100m", "over_best", "over_best_low", "over_best_high", "tracked") if name in frame]
     text = frame[shown].head(40).to_string(index=False, float_format="%.3f", na_rep="-")
@@ -250,5 +257,5 @@ def command(drives, models, out, frames, held_out, held_out_frames, kinds, filte
         search.race(shares)
     table = search.table(shares)
     click.echo(write_results(out, table))
-    for line in judged(table, seen):
+    for line in (*judged(table, seen), *too_short(seen)):
         click.echo(line)

@@ -43,6 +43,8 @@ RUN_ELSEWHERE = {
     "stemvo-lab export resnet50.onnx": "tests/lab/export_graph_test.py",
     "stemvo calibrate": "tests/long/calibrate_test.cpp",  # a short drive does not tell of the camera
     "stemvo-lab warps": "tests/lab/warps_test.py",
+    "build/release/stemvo synth build/teacher": "tests/lab/long/default_model_test.py",
+    "stemvo-lab learn build/teacher": "tests/lab/long/default_model_test.py",
     "build/lab/bin/ray": "tests/lab/long/ray_test.py",
     "build/lab/bin/stemvo-lab search KITTI/sequences/00 --model stems/a.onnx": "tests/lab/long/ray_test.py",
 }
@@ -56,6 +58,8 @@ IN_PLACE_OF = [
     (r"--calib refined.txt", "--calib KITTI/sequences/00/calib.txt"),
     (r"( --model stems/(efficientnetv2b0|mobilenet025|resnet18)\.onnx){3}", ""),
     (r"--model (M\b|stems/efficientnetv2b0.onnx)", "--model default"),
+    # Ray starts slowly: with README's search, a robustness and ray_test.py it has been tried.
+    (r"(stemvo-lab (search .*--model default|robustness KITTI/sequences/03 --kinds).*) --out", r"\1 --no-ray --out"),
     (r"\bNAME\.onnx", "weights.onnx"),
     (r"\bWEIGHTS\b", "weights.npz"),
     (r"\bRECORDING\b", "KITTI/sequences/03"),
@@ -98,7 +102,8 @@ class TestCodeBlocks:
         folder = self.temporary.mktemp("reader")
         for entry in self.drives.iterdir():
             (folder / entry.name).symlink_to(entry)
-        (folder / "tools").symlink_to(ROOT / "tools")
+        for name in ("models", "tools"):
+            (folder / name).symlink_to(ROOT / name)
         (folder / "build/release").mkdir(parents=True)
         (folder / "build/release/stemvo").symlink_to(PROGRAM)
         (folder / "build/lab").symlink_to(ROOT / "build/lab")

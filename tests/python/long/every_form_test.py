@@ -356,7 +356,9 @@ def test_gray_levels(drive, form):
         top = 2 ** int(form.split()[0]) - 1
         recording = drive.own(pixels=[np.round(pixels * (top / 255)).astype(np.uint16) for pixels in gray])
     poses = drive.run(recording)
-    compare(poses, drive.run(drive.own(pixels=gray)))
+    if "gray" not in drive.known:
+        drive.known["gray"] = drive.run(drive.own(pixels=gray))
+    compare(poses, drive.known["gray"])
 
 
 @pytest.mark.parametrize("form", ["KITTI", "KITTI with commas", "TUM", "TUM with commas", "EuRoC"])
