@@ -37,9 +37,10 @@ struct KeptCorner {
 struct KeptKeyframe {
   int frame = 0;
   double time_s = 0.0;
-  Camera camera;             ///< as it was when the frame came
-  Eigen::Vector2d radial = Eigen::Vector2d::Zero();  ///< of the RadialLens that corners are freed of
-  Rigid3 world_from_camera;  ///< in the trajectory, as it came
+  Camera camera;  ///< as it was when the frame came
+  Eigen::Vector2d radial =
+      Eigen::Vector2d::Zero();  ///< of the RadialLens that corners are freed of
+  Rigid3 world_from_camera;     ///< in the trajectory, as it came
   std::vector<KeptCorner>
       corners;  ///< ordered by track id; empty: it shows a place that is kept already
   std::vector<Descriptor> descriptors;  ///< one per corner; empty: it is no place to be recognized

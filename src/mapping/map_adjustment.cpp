@@ -153,8 +153,8 @@ class Adjustment {
     for (std::size_t i = 0; i < tracks_.size(); ++i) {
       for (const MapView& view : tracks_[i]) {
         AdjustedPose& pose = poses_[slot(view.keyframe)];
-        auto* error =
-            new CornerError(frame_uv(view), base_camera(view.keyframe), points_[i], pose, sigma_px_);
+        auto* error = new CornerError(frame_uv(view), base_camera(view.keyframe), points_[i], pose,
+                                      sigma_px_);
         double* camera = camera_change(view.keyframe);
         residuals_.push_back({problem_.AddResidualBlock(error, &corner_loss_, points_[i].at.data(),
                                                         pose.delta.data(), camera),

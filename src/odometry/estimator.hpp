@@ -38,8 +38,8 @@ struct Frame {
   std::vector<Way> ways;  ///< that came before this frame did
   cv::Mat image;          ///< as given, gray or RGB: where landmarks get their colour
   std::shared_ptr<ImagePyramid> pyramid;  ///< of the channel: where points are tracked
-  std::shared_ptr<const RoadImage> road;        ///< null: the road is not asked
-  Matches matches;                              ///< none on the first image
+  std::shared_ptr<const RoadImage> road;  ///< null: the road is not asked
+  Matches matches;                        ///< none on the first image
   /// prev_from_cur from the last image, by the whole of both (ImageTurn). nullopt: not known.
   std::optional<Eigen::Quaterniond> image_turn = std::nullopt;
   StageTimes times;

@@ -125,7 +125,8 @@ void SelfCalibration::fuse_result() {
               kBias_px)) {
     target_.tail<2>() = mean_.tail<2>();
   }
-  if (refinement_ == CameraRefinement::kAll && insists(mean_[2], sigmas[2], kMaxSigmaOfFocal, 0.0)) {
+  if (refinement_ == CameraRefinement::kAll &&
+      insists(mean_[2], sigmas[2], kMaxSigmaOfFocal, 0.0)) {
     target_[2] = mean_[2];
   }
 }

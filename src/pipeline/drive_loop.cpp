@@ -152,7 +152,8 @@ class DriveLoop {
       const Camera& camera = run_.sequence.camera;
       const cv::Mat plain =
           frame.value_or(cv::Mat(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(60)));
-      const cv::Mat drawn = draw_frame_image(plain, {{}, seen.image().map}, seen.matches(), seen.inlier_mask());
+      const cv::Mat drawn =
+          draw_frame_image(plain, {{}, seen.image().map}, seen.matches(), seen.inlier_mask());
       has_scale_ = has_scale_ || pose.scale_state >= ScaleState::kHeld ||
                    request.config.scale_choice == ScaleChoice::kGroundTruth;
       run_.video.add(draw_under_caption(drawn, caption, colors), drive_.trajectory,
