@@ -103,6 +103,9 @@ void bind_result(nb::module_& module) {
       .def_prop_ro(
           "camera", [](const FrameResult& r) { return r.camera; }, "With what was learnt so far")
       .def_prop_ro(
+          "radial", [](const FrameResult& r) { return r.radial; },
+          "k1, k2 of a distortion that frames had nevertheless: pixels are freed of it")
+      .def_prop_ro(
           "camera_sigma", [](const FrameResult& r) { return r.camera_sigma; },
           "None: the camera is not refined")
       .def_prop_ro("csv_row", &row_of, "As in frames.csv, without the frame's number and errors")

@@ -90,6 +90,8 @@ struct FrameResult {
   ScaleState scale_state = ScaleState::kDisabled;
   std::string_view road_reason;  ///< why the road was not measured, else empty
   Camera camera;  ///< without distortion, with what was learnt so far (`camera.refine`)
+  /// k1, k2 of a distortion that frames had nevertheless: pixels are freed of it.
+  Eigen::Vector2d radial = Eigen::Vector2d::Zero();
   std::optional<CameraSigma> camera_sigma;  ///< nullopt: it is not refined
   std::optional<double> scale_sigma;  ///< of log(metres per unit); nullopt: the road is not asked
   StageTimes times;

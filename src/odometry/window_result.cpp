@@ -94,6 +94,7 @@ void WindowEstimator::take_in(const Recognition& recognition) {
 /// All but what localize() told.
 void WindowEstimator::describe(const Frame& frame, FrameResult& result) {
   result.camera = camera();
+  result.radial = calibration_.radial();
   result.camera_sigma = calibration_.camera_sigma();
   result.world_from_camera = world_from_camera_;
   result.is_scale_new = is_localized(frame) && result.state == FrameState::kInitializing;

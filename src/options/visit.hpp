@@ -220,7 +220,7 @@ template <Is<CameraOptions> O, typename V>
 void visit(O& o, V&& v) {
   v("refine", o.refine, kAny,
     "mode map: what of the given camera is refined while driving, where the images insist: off "
-    "(nothing), principal_point, or all (the focal length too)");
+    "(nothing), principal_point (and the distortion that is left), or all (the focal length too)");
 }
 
 template <Is<ScaleOptions> O, typename V>

@@ -209,7 +209,8 @@ class ResultWriter {
         share_of(drive_.frames, [](const FrameResult& frame) { return frame.is_measured; });
     add_maps(drive_.frames, report);
     report.in_place_fraction = share_in_place(drive_.frames);
-    report.camera = {drive_.frames.back().camera, drive_.frames.back().camera_sigma};
+    const FrameResult& last = drive_.frames.back();
+    report.camera = {last.camera, last.camera_sigma, last.radial};
     if (config.scale.source == ScaleSource::kCameraHeight) {
       report.road_measured_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
         return frame.scale_state == ScaleState::kMeasured;

@@ -51,6 +51,10 @@ std::string head(const MetricsReport& report) {
                                camera.cx_px, camera.cy_px, sigma->cx_px, sigma->cy_px)});
     table.add({"", fmt::format("focal length {:.1f} px, known to {:.1f} px", camera.fx_px,
                                sigma->fx_px)});
+    if (const Eigen::Vector2d& k = report.camera.radial; !k.isZero()) {
+      table.add({"", fmt::format("frames have a distortion k1 {:.4f}, k2 {:.4f}: taken out", k[0],
+                                 k[1])});
+    }
   }
   if (report.road_measured_fraction) {
     table.add({"road", fmt::format("measured on {:.1f} % of the frames, believed on {:.1f} %",
@@ -118,10 +122,8 @@ std::string error_table(const MetricsReport& report) {
 // Found by nlohmann's library.
 void to_json(Json& json, const CameraReport& report) {
   const Camera& camera = report.camera;
-  json = {{"fx_px", camera.fx_px},
-          {"fy_px", camera.fy_px},
-          {"cx_px", camera.cx_px},
-          {"cy_px", camera.cy_px}};
+  json = {{"fx_px", camera.fx_px}, {"fy_px", camera.fy_px},  {"cx_px", camera.cx_px},
+          {"cy_px", camera.cy_px}, {"k1", report.radial[0]}, {"k2", report.radial[1]}};
   const std::optional<CameraSigma>& sigma = report.sigma;
   json["fx_sigma_px"] = sigma ? Json(sigma->fx_px) : Json();
   json["cx_sigma_px"] = sigma ? Json(sigma->cx_px) : Json();

@@ -30,6 +30,7 @@ namespace stemvo {
 struct CameraReport {
   Camera camera;
   std::optional<CameraSigma> sigma;  ///< nullopt: it is not refined
+  Eigen::Vector2d radial = Eigen::Vector2d::Zero();
 };
 
 struct MapReport {

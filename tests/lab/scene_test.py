@@ -43,7 +43,8 @@ def call(result, kind):
 
 def test_colmap(result):
     out = call(result, "colmap")
-    camera = list(map(float, (out / "sparse/0/cameras.txt").read_text().split()[4:]))
+    camera = list(map(float, (out / "sparse/0/cameras.txt").read_text().split()[4:8]))
+    assert (out / "sparse/0/cameras.txt").read_text().split() == ["1", "OPENCV", "620", "188", *map(repr, camera), "0.0", "0.0", "0", "0"]
     number, w, x, y, z, *place, _, name = (out / "sparse/0/images.txt").read_text().splitlines()[-2].split()
     assert (number, name) == ("18", "000019.png") and (out / "images" / name).exists() and len(list((out / "images").iterdir())) == 18
     turn = Rotation.from_quat(list(map(float, (x, y, z, w)))).as_matrix()

@@ -60,7 +60,7 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
       "scale_source": "ground_truth", "in_place_fraction": 0.0,
       "road_measured_fraction": 0.75, "road_believed_fraction": 0.875,
       "maps": 2, "scale_new_frames": [1, 120], "map": null,
-      "camera": {"fx_px": 700.0, "fy_px": 710.0, "cx_px": 600.5, "cy_px": 180.25,
+      "camera": {"fx_px": 700.0, "fy_px": 710.0, "cx_px": 600.5, "cy_px": 180.25, "k1": 0.0, "k2": 0.0,
                  "fx_sigma_px": 3.5, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75},
       "alignment": "none", "path_length_m": 145.25, "null_offset_m": 79.25,
       "t_rel_percent": 0.97, "r_rel_deg_per_100m": 1.72,

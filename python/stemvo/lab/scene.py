@@ -54,7 +54,7 @@ def write_colmap(out, camera, names, poses, points):
     """out/sparse/0: the text model, whose points have no observations (colmap point_triangulator finds them)."""
     folder = out / "sparse/0"
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "cameras.txt").write_text(f"1 PINHOLE {camera['w']} {camera['h']} {camera['fl_x']!r} {camera['fl_y']!r} {camera['cx']!r} {camera['cy']!r}\n")
+    (folder / "cameras.txt").write_text("1 OPENCV " + " ".join(map(repr, camera.values())) + " 0 0\n")
     lines = []
     for number, (name, pose) in enumerate(zip(names, np.linalg.inv(poses)), 1):
         if name is not None:
@@ -89,7 +89,7 @@ def command(result, recording, out, kind, camera):
     read = stemvo.read_recording(recording, camera, frames=f"{first}:{first + len(poses)}")
     pinhole = said["camera"]
     intrinsics = {"w": read.camera.width, "h": read.camera.height, "fl_x": pinhole["fx_px"], "fl_y": pinhole["fy_px"],
-                  "cx": pinhole["cx_px"] + HALF_PX, "cy": pinhole["cy_px"] + HALF_PX}
+                  "cx": pinhole["cx_px"] + HALF_PX, "cy": pinhole["cy_px"] + HALF_PX, "k1": pinhole["k1"], "k2": pinhole["k2"]}
     runs.open_folder(out, "scene", [result / "metrics.json", recording, camera])
     names = write_images(read, first, out / "images")
     {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](out, intrinsics, names, poses, points)
