@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -17,6 +18,8 @@ namespace {
 constexpr double kPriorSigma[] = {10.0, 10.0, 0.003, 0.01, 0.005};
 /// Prior where the focal length is asked for as well: the given one may be another camera's.
 constexpr double kWeakPriorSigma[] = {30.0, 30.0, 0.03, 0.02, 0.01};
+/// Prior where an earlier recording has learnt the same camera.
+constexpr double kEarlierSigma[] = {0.5, 0.5, 0.003, 0.003, 0.0015};
 /// Errors of a track's points are alike: a run tells less than as many independent ones would.
 constexpr double kSigmaFactorSq = 2.0 * 2.0;
 /// Forward motion biases all tracks the same way: without this factor focal lengths that are known
@@ -34,7 +37,7 @@ constexpr double kBias_px = 0.3;
 /// The camera moves by this at a keyframe: the window can follow.
 constexpr double kMaxStep_px = 0.25;
 /// .. and its lens moves the image's sides by this: while it is not right, lengths drift in turns.
-constexpr double kMaxLensStep_px = 1.0;
+constexpr double kMaxLensStep_px = 3.0;
 
 /// The numbers are finite and the information is positive.
 bool is_plausible(const CameraMeasurement& found) {
@@ -68,6 +71,21 @@ SelfCalibration::SelfCalibration(const Camera& given,
       may_begin_threads_(may_begin_threads) {
   const IntrinsicsDelta sigma = prior_sigma(refinement).value_or(IntrinsicsDelta::Ones());
   information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+}
+
+void SelfCalibration::begin_with(const Camera& learnt, const Eigen::Vector2d& radial) {
+  const auto given_alike = [](const Camera& camera) {
+    return std::tuple(camera.fx_px, camera.fy_px, camera.width_px, camera.height_px);
+  };
+  if (refinement_ == CameraRefinement::kOff || given_alike(learnt) != given_alike(given_)) {
+    return;
+  }
+  camera_ = learnt;
+  radial_ = radial;
+  mean_ = applied();
+  target_ = mean_;
+  const Eigen::Map<const IntrinsicsDelta> sigma(kEarlierSigma);
+  information_.diagonal() = information_.diagonal().cwiseMax(sigma.cwiseAbs2().cwiseInverse());
 }
 
 IntrinsicsDelta SelfCalibration::sigma() const {

@@ -29,6 +29,8 @@ class SelfCalibration {
 
   SelfCalibration(const Camera& given, CameraRefinement refinement, bool may_begin_threads = true);
 
+  /// Before the first keyframe: what an earlier recording learnt, where its camera was given alike.
+  void begin_with(const Camera& learnt, const Eigen::Vector2d& radial);
   /// Takes the next keyframe, refined where the window is. A run that is long enough is measured
   /// until the next call, in another thread where it may begin one,
   /// and taken in then: the same on any number of threads.

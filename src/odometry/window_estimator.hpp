@@ -67,7 +67,12 @@ class WindowEstimator final : public Estimator {
   }
   [[nodiscard]] std::span<const int> keyframes() const override { return history_.keyframes(); }
 
-  void load_map(KeptMap map) override { mapper_.load(std::move(map)); }
+  void load_map(KeptMap map) override {
+    if (!map.keyframes.empty()) {
+      calibration_.begin_with(map.keyframes.back().camera, map.keyframes.back().radial);
+    }
+    mapper_.load(std::move(map));
+  }
   [[nodiscard]] KeptMap kept_map() const override { return mapper_.map(window_view()); }
   [[nodiscard]] std::optional<CameraEstimate> camera_estimate() const override {
     return calibration_.estimate();

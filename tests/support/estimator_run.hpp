@@ -94,7 +94,7 @@ class EstimatorRun {
   FrameHints hints;                                           ///< of the next frame alone
   cv::Mat image;                                              ///< of the next frame
   std::function<std::shared_ptr<const RoadImage>(int)> road;  ///< of the drive's frames, or none
-  std::function<std::shared_ptr<const ImagePyramid>(int)> pyramid;  ///< likewise
+  std::function<std::shared_ptr<ImagePyramid>(int)> pyramid;  ///< likewise
   std::vector<FrameResult> results;
   std::vector<char> inlier_mask;  ///< of the last frame: the tracks that go on
   std::vector<int> point_ids;     ///< of the same matches

@@ -25,7 +25,7 @@ void end_tracks(DriveTracks& drive, int cut) {
 }
 
 /// Each point has a texture of its own, which faces the camera.
-std::shared_ptr<const ImagePyramid> paint(const DriveTracks& drive, int frame) {
+std::shared_ptr<ImagePyramid> paint(const DriveTracks& drive, int frame) {
   constexpr int kHalf = 20;
   cv::Mat image(drive.camera.height_px, drive.camera.width_px, CV_8UC1, cv::Scalar(127));
   const cv::Rect whole(0, 0, image.cols, image.rows);

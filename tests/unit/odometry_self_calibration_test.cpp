@@ -147,6 +147,16 @@ TEST_F(SelfCalibrationTest, FindsALensThatNobodyKnewOf) {
     const Eigen::Vector2d uv(u_px, 250.0);
     EXPECT_LT((calibration.lens().undistort(lens.distort(uv)) - uv).norm(), 0.5) << u_px;
   }
+  SelfCalibration again(truth_, CameraRefinement::kPrincipalPoint);
+  again.begin_with(calibration.camera(), calibration.radial());
+  EXPECT_EQ(again.radial(), calibration.radial());
+  drive_runs(truth_, again, radial);
+  const Eigen::Vector2d side(0.0, 250.0);
+  EXPECT_LT((again.lens().undistort(lens.distort(side)) - side).norm(), 0.5);
+  given_.fx_px += 1.0;
+  SelfCalibration other(given_, CameraRefinement::kPrincipalPoint);
+  other.begin_with(calibration.camera(), calibration.radial());
+  EXPECT_TRUE(other.radial().isZero()) << "another camera";
 }
 
 TEST(RadialLens, UndistortsWhatItDistorts) {
