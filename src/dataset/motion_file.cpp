@@ -57,7 +57,8 @@ Expected<TimedRows<SpeedRow>> read_speeds(const std::filesystem::path& file,
   STEMVO_TRY(check_names(file, "km *(/|p|per)? *h|kilomet[a-z]*|kph|mph|knots|miles|[cm]m */ *s",
                          "(^|[^a-z])m[ /]+s", "m/s"));
   STEMVO_TRY(check_names(file,
-                         "[^a-z]v(el|elocity)?[_. ]?y([^a-z]|$)|(sig|std)[a-z]*[^a-z]+(v|speed)",
+                         "[^a-z]v(el|elocity)?[_. ]?y([^a-z]|$)|"
+                         "^(?!.*[^a-z](v|speed).*(sig|std)).*(sig|std)[a-z]*[^a-z]+(v|speed)",
                          "^ $", "columns of time, speed [, sigma]"));
   STEMVO_TRY_GET(const auto found, read_timed_rows(file, {2, 3}, "a time, m/s and maybe a sigma",
                                                    {.span_s = span_s}));
@@ -80,8 +81,8 @@ Expected<TimedRows<GyroRow>> read_gyro(const std::filesystem::path& file,
   STEMVO_TRY(check_names(file, "deg|dps|\xC2\xB0", "(^|[^a-z])rad[ /]+s", "rad/s"));
   // The first x is an acceleration's, or a y or z comes before it.
   STEMVO_TRY(check_names(file,
-                         "^[^x]*[^a-z]((a|acc[a-z]*|lin[a-z]*)([_. ][a-z_. ]*)?x|"
-                         "([a-z]+[_.])*[wg]?[yz])([^a-z]|$)",
+                         "^[^x]*[^a-z](a|acc[a-z]*|lin[a-z]*)([_. ][a-z_. ]*)?x([^a-z]|$)|"
+                         "^[^x0-9]*[^a-z]([a-z]+[_.])*[wg]?[yz][^a-z].*x([^a-z]|$)",
                          "^ $", "columns of time, rates about x, y and z"));
   STEMVO_TRY_GET(
       const auto found,

@@ -19,7 +19,7 @@ namespace stemvo {
 /// A track seen in a frame.
 struct Observation {
   int track_id = -1;
-  Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< input pixels
+  Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< input pixels, freed of PixelMap::lens
 };
 /// All of one frame, ordered by track id.
 using Observations = std::vector<Observation>;

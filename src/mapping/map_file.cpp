@@ -194,9 +194,10 @@ bool is_corner(const KeptCorner& corner) {
 }
 
 std::string_view flaw_of(const KeptKeyframe& keyframe) {
-  return !is_number(keyframe.frame)                                       ? "a frame's number"
-         : !std::isfinite(keyframe.time_s)                                ? "a finite time"
-         : !check_camera(keyframe.camera) || !keyframe.radial.allFinite() ? "a camera"
+  return !is_number(keyframe.frame)        ? "a frame's number"
+         : !std::isfinite(keyframe.time_s) ? "a finite time"
+         : !check_camera(keyframe.camera) || !(keyframe.radial.lpNorm<Eigen::Infinity>() < 0.5)
+             ? "a camera"
          : !is_motion(keyframe.world_from_camera.rotation, keyframe.world_from_camera.translation)
              ? "a pose"
          : !std::ranges::all_of(keyframe.corners, is_corner) ? "finite corners"

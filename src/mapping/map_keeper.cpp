@@ -171,7 +171,7 @@ void MapKeeper::add_node(const WindowView& view, const Keyframe& keyframe) {
   kept.frame = keyframe.frame;
   kept.time_s = view.times_s[frame];
   kept.camera = view.camera;
-  kept.radial = view.radial;
+  kept.radial = view.radials[frame];
   kept.world_from_camera = view.trajectory[frame];
   const int node = static_cast<int>(map_.keyframes.size());
   if (nodes_.empty() && node > 0 && map_.keyframes.back().frame == keyframe.frame) {

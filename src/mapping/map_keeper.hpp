@@ -21,8 +21,8 @@ struct WindowView {
   const Window& window;
   const WindowHistory& history;  ///< of its units
   const Camera& camera;
-  const Eigen::Vector2d& radial;       ///< of its RadialLens
-  std::span<const Rigid3> trajectory;  ///< of the frames that have ended
+  std::span<const Eigen::Vector2d> radials;  ///< of the RadialLens that frames were freed of
+  std::span<const Rigid3> trajectory;        ///< of the frames that have ended
   std::span<const double> times_s;
   std::optional<double> metric_sigma;  ///< of log(metres per unit); nullopt: units are no metres
   int last_localized = -1;             ///< the last frame that landmarks placed

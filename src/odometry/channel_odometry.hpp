@@ -48,7 +48,10 @@ class ChannelOdometry {
   }
 
   /// As Estimator's.
-  void load_map(KeptMap map) { estimator_->load_map(std::move(map)); }
+  void load_map(KeptMap map) {
+    estimator_->load_map(std::move(map));
+    lens_ = estimator_->lens();
+  }
 
   /// One per frame optimized.
   [[nodiscard]] const std::vector<double>& times_s() const { return times_s_; }

@@ -54,10 +54,11 @@ std::vector<MapKeyframe> keyframes_of(const ChannelOdometry& frames, int first) 
 std::vector<TrackedPoint> tracked_points_of(const ChannelOdometry& frames) {
   const Matches& matches = frames.matches();
   const std::vector<char>& is_inlier = frames.inlier_mask();
+  const RadialLens& lens = frames.image().map.lens;  // the points are shown on the frame
   std::vector<TrackedPoint> points;
   for (std::size_t i = 0; i < matches.track_ids.size(); ++i) {
-    points.push_back({matches.track_ids[i], matches.prev_uv[i], matches.cur_uv[i],
-                      i < is_inlier.size() && is_inlier[i] != 0});
+    points.push_back({matches.track_ids[i], lens.distort(matches.prev_uv[i]),
+                      lens.distort(matches.cur_uv[i]), i < is_inlier.size() && is_inlier[i] != 0});
   }
   return points;
 }

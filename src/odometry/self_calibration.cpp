@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -18,8 +17,6 @@ namespace {
 constexpr double kPriorSigma[] = {10.0, 10.0, 0.003, 0.01, 0.005};
 /// Prior where the focal length is asked for as well: the given one may be another camera's.
 constexpr double kWeakPriorSigma[] = {30.0, 30.0, 0.03, 0.02, 0.01};
-/// Prior where an earlier recording has learnt the same camera.
-constexpr double kEarlierSigma[] = {0.5, 0.5, 0.003, 0.003, 0.0015};
 /// Errors of a track's points are alike: a run tells less than as many independent ones would.
 constexpr double kSigmaFactorSq = 2.0 * 2.0;
 /// Forward motion biases all tracks the same way: without this factor focal lengths that are known
@@ -73,19 +70,25 @@ SelfCalibration::SelfCalibration(const Camera& given,
   information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
-void SelfCalibration::begin_with(const Camera& learnt, const Eigen::Vector2d& radial) {
-  const auto given_alike = [](const Camera& camera) {
-    return std::tuple(camera.fx_px, camera.fy_px, camera.width_px, camera.height_px);
-  };
-  if (refinement_ == CameraRefinement::kOff || given_alike(learnt) != given_alike(given_)) {
+void SelfCalibration::begin_with(const KeptKeyframe& of_map) {
+  constexpr double kMaxOfFocal = 0.01;
+  constexpr double kMaxCenter_px = 10.0;
+  constexpr double kMinSide_px = 2.0;  // of a lens that was certain
+  const Camera& other = of_map.camera;
+  const bool is_same =
+      other.width_px == given_.width_px && other.height_px == given_.height_px &&
+      std::abs(other.fx_px / given_.fx_px - 1.0) < kMaxOfFocal &&
+      std::abs(other.fy_px / given_.fy_px - 1.0) < kMaxOfFocal &&
+      std::hypot(other.cx_px - given_.cx_px, other.cy_px - given_.cy_px) < kMaxCenter_px;
+  if (refinement_ == CameraRefinement::kOff || !is_same ||
+      std::abs(side_px().dot(of_map.radial)) < kMinSide_px) {
     return;
   }
-  camera_ = learnt;
-  radial_ = radial;
+  radial_ = of_map.radial;
   mean_ = applied();
   target_ = mean_;
-  const Eigen::Map<const IntrinsicsDelta> sigma(kEarlierSigma);
-  information_.diagonal() = information_.diagonal().cwiseMax(sigma.cwiseAbs2().cwiseInverse());
+  const Eigen::Vector2d sigma(0.003, 0.0015);
+  information_.diagonal().tail<2>() = sigma.cwiseAbs2().cwiseInverse();
 }
 
 IntrinsicsDelta SelfCalibration::sigma() const {
@@ -94,14 +97,18 @@ IntrinsicsDelta SelfCalibration::sigma() const {
   return sigma;
 }
 
-void SelfCalibration::observe(const Keyframe& keyframe, const BundleOptions& options) {
+void SelfCalibration::observe(const Keyframe& keyframe,
+                              const Eigen::Vector2d& radial,
+                              const BundleOptions& options) {
   if (refinement_ == CameraRefinement::kOff) {
     return;
   }
   fuse_result();
   approach_target();
   const WindowOptions window_options{.num_keyframes = kNumKeyframes};
-  add_keyframe(run_, keyframe, window_options);
+  Keyframe freed = keyframe;
+  free_again(radial_lens(camera_, radial), freed.points);
+  add_keyframe(run_, std::move(freed), window_options);
   triangulate_landmarks(run_, camera_, window_options);
   if (static_cast<int>(run_.keyframes.size()) == kNumKeyframes) {
     begin_measuring(options);
@@ -168,7 +175,13 @@ void SelfCalibration::approach_lens(const Eigen::Vector2d& left) {
   const RadialLens before = lens();
   radial_ += std::min(1.0, kMaxLensStep_px / std::abs(side_px().dot(left))) * left;
   for (Keyframe& keyframe : run_.keyframes) {
-    for (Observation& point : keyframe.points) {
+    free_again(before, keyframe.points);
+  }
+}
+
+void SelfCalibration::free_again(const RadialLens& before, Observations& points) const {
+  if (before.k != radial_) {
+    for (Observation& point : points) {
       point.uv = lens().undistort(before.distort(point.uv));
     }
   }

@@ -8,6 +8,7 @@
 
 #include "geometry/bundle.hpp"
 #include "geometry/radial_lens.hpp"
+#include "mapping/kept_map.hpp"
 #include "odometry/window.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/frame_result.hpp"
@@ -29,12 +30,16 @@ class SelfCalibration {
 
   SelfCalibration(const Camera& given, CameraRefinement refinement, bool may_begin_threads = true);
 
-  /// Before the first keyframe: what an earlier recording learnt, where its camera was given alike.
-  void begin_with(const Camera& learnt, const Eigen::Vector2d& radial);
+  /// Before the first keyframe: the lens that an earlier recording learnt, where its camera is much
+  /// the same.
+  void begin_with(const KeptKeyframe& of_map);
   /// Takes the next keyframe, refined where the window is. A run that is long enough is measured
   /// until the next call, in another thread where it may begin one,
   /// and taken in then: the same on any number of threads.
-  void observe(const Keyframe& keyframe, const BundleOptions& options);
+  /// `radial`: of the lens that the keyframe's pixels were freed of.
+  void observe(const Keyframe& keyframe,
+               const Eigen::Vector2d& radial,
+               const BundleOptions& options);
   /// Rescales the run as the window is rescaled.
   void rescale(double factor, const Eigen::Vector3d& center) {
     stemvo::rescale(run_, factor, center);
@@ -74,6 +79,8 @@ class SelfCalibration {
   void fuse_result();
   void approach_target();
   void approach_lens(const Eigen::Vector2d& left);
+  /// Pixels that were freed of another lens are freed of lens().
+  void free_again(const RadialLens& before, Observations& points) const;
   /// What a pixel at the image's side is moved by, px, for k1 and k2 of 1.
   [[nodiscard]] Eigen::Vector2d side_px() const;
   [[nodiscard]] IntrinsicsDelta applied() const {

@@ -55,6 +55,7 @@ LocalizedFrame WindowEstimator::localize(const Frame& frame) {
     speed_ = speed_ > 0.0 ? speed_ : assumed_step_ / interval_s_;
   }
   times_s_.push_back(frame.time_s);
+  radials_.push_back(frame.pyramid ? frame.pyramid->channel.map.lens.k : lens().k);
   recognized_frame_ = -1;
   moved_.reset();
   LocalizedFrame localized;
@@ -340,7 +341,8 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
   uncertainty_.adjusted(window_, view_.points, world_from_camera_, trajectory_.back(), camera(),
                         localization_.loss_px);
   // The newest keyframe but one: it has its new corners.
-  calibration_.observe(*std::prev(window_.keyframes.end(), 2), refinement_);
+  const Keyframe& complete = *std::prev(window_.keyframes.end(), 2);
+  calibration_.observe(complete, radials_[static_cast<std::size_t>(complete.frame)], refinement_);
   history_.observe(window_, frame.image);
   take_in(mapper_.observe(window_view(), frame.pyramid));
 }

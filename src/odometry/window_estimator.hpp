@@ -69,7 +69,7 @@ class WindowEstimator final : public Estimator {
 
   void load_map(KeptMap map) override {
     if (!map.keyframes.empty()) {
-      calibration_.begin_with(map.keyframes.back().camera, map.keyframes.back().radial);
+      calibration_.begin_with(map.keyframes.back());
     }
     mapper_.load(std::move(map));
   }
@@ -115,7 +115,7 @@ class WindowEstimator final : public Estimator {
   void reset_reference(View reference);
   [[nodiscard]] bool open_window(View view);
   [[nodiscard]] WindowView window_view() const {
-    return {window_,     history_, camera(),      calibration_.radial(),
+    return {window_,     history_, camera(),      radials_,
             trajectory_, times_s_, metric_sigma_, view_.frame};
   }
   /// The camera in use: SelfCalibration owns it, everything else takes it as an argument.
@@ -160,6 +160,7 @@ class WindowEstimator final : public Estimator {
   MotionModel motion_;                       ///< between localized frames
   std::optional<MotionModel::Fused> fused_;  ///< the frame in work, where parallax is low
   double assumed_step_;  ///< in the first interval, where nothing measures a length
+  std::vector<Eigen::Vector2d> radials_;  ///< of the lenses that frames' pixels were freed of
   HintTrust trust_;
   double speed_ = 0.0;          ///< of the last step measured or assumed, units per second
   double interval_s_ = 0.0;     ///< between the frame in work and the one before

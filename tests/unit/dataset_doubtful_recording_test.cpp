@@ -47,6 +47,7 @@ TEST_F(DoubtfulRecording, NumbersThatCountNoFramesAreCountedEvenly) {
   for (const auto& names : std::vector<std::vector<std::string>>{
            {"1700000000033.png", "1700000000066.png", "1700000000100.png"},
            {"12-30-58.png", "12-30-59.png", "12-31-00.png"},
+           {"20240101_120058.png", "20240101_120059.png", "20240101_120100.png"},
            {"5.1.png", "5.2.png", "5.4.png"},
            {"1.png", "8.png", "30.png", "31.png"}}) {
     const FrameSource source = open_source(write_images(names)).value();
@@ -72,6 +73,7 @@ TEST_F(DoubtfulRecording, DaysBeforeMonthsAndYearsAreNotInTheOrderOfTime) {
        std::vector<std::vector<std::string>>{{"27-11-2026_12-00-01.png", "27-11-2026_12-00-02.png"},
                                              {"27-11-2026_23-59-59.png", "28-11-2026_00-00-00.png"},
                                              {"11-30-2026_23-59-59.png", "12-01-2026_00-00-00.png"},
+                                             {"01-12-2026_23-59-59.png", "01-13-2026_00-00-00.png"},
                                              {"2026-11-30_23-59-59.png", "2026-12-01_00-00-00.png"},
                                              {"20261130_235959.png", "20261201_000000.png"},
                                              {"00111999.png", "00112000.png"}}) {

@@ -64,7 +64,8 @@ TEST_F(MotionFile, ColumnsInAnotherOrderAreRefused) {
   for (const char* names :
        {"timestamp,gx,gy,gz,ax,ay,az", "t wx wy wz", "time (s), rate about x, y, z (rad/s)",
         "Stamp, angular_velocity.x, angular_velocity.y, angular_velocity.z, linear_acceleration.x",
-        "made by my phone, a gyro alone", "time in s, gyro x y z in rad/s, accelerometer x y z",
+        "made by my phone, a gyro alone", "recorded 2024-01-01T12:00:00Z", "z up", "by Y. Tanaka",
+        "time in s, gyro x y z in rad/s, accelerometer x y z",
         "timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y,w_RS_S_z,a_RS_S_x,a_RS_S_y,a_RS_S_z"}) {
     EXPECT_EQ(error_of(names), "no error") << names;
   }
@@ -72,7 +73,10 @@ TEST_F(MotionFile, ColumnsInAnotherOrderAreRefused) {
               HasSubstr("motion.txt:3: expected a time after 0.1 s"));
   EXPECT_THAT(speed_error("# time vx vy\n0 1 1\n"), HasSubstr("expected columns of time, speed"));
   EXPECT_THAT(speed_error("# t, sigma, v\n0 1 1\n"), HasSubstr("expected columns of time, speed"));
-  EXPECT_TRUE(read_speeds(write("# time, speed, sigma of velocity\n0 1 1\n")));
+  for (const char* names : {"time, speed, sigma of velocity", "time,speed,sigma_speed",
+                            "t [s], v [m/s], std_v [m/s]", "time, v, std (varies)"}) {
+    EXPECT_TRUE(read_speeds(write(fmt::format("# {}\n0 1 1\n", names)))) << names;
+  }
 }
 
 TEST_F(MotionFile, EurocsTimesAreNanoseconds) {

@@ -47,7 +47,7 @@ class MapKeeperWindows : public ::testing::Test {
     }
     history_.observe(window, image_);
     history_.end_frame(window);
-    WindowView view{window, history_, camera_, radial_, trajectory_, times_s_, 0.01, last};
+    WindowView view{window, history_, camera_, radials_, trajectory_, times_s_, 0.01, last};
     keeper_.add_nodes(view);
     keeper_.close(view);
     history_.close(window);
@@ -60,7 +60,7 @@ class MapKeeperWindows : public ::testing::Test {
   }
 
   const Camera camera_{300.0, 300.0, 160.0, 120.0, 320, 240};
-  const Eigen::Vector2d radial_ = Eigen::Vector2d::Zero();
+  const std::vector<Eigen::Vector2d> radials_{1000, Eigen::Vector2d::Zero()};
   const cv::Mat image_{240, 320, CV_8UC1, cv::Scalar(0)};
   std::vector<Rigid3> trajectory_;
   std::vector<double> times_s_;

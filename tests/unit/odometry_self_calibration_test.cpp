@@ -23,14 +23,16 @@ void observe_run(int k,
     path.push_back(path.back() * Rigid3(so3_exp(turn(i)), step));
   }
   const DriveTracks drive(path, points, 0.1, static_cast<std::uint64_t>(k), true_camera);
+  RadialLens next = calibration.lens();
   for (int i = 0; i < kLength; ++i) {
+    const RadialLens lens = std::exchange(next, calibration.lens());  // as it was a keyframe before
     Keyframe keyframe{kLength * k + i, drive.pose(i), {}};
     for (const auto& [id, uv] : drive.observations[static_cast<std::size_t>(i)]) {
       const Eigen::Vector2d frame_uv = radial_lens(true_camera, radial).distort(uv);
-      keyframe.points.push_back({id, calibration.lens().undistort(frame_uv)});
+      keyframe.points.push_back({id, lens.undistort(frame_uv)});
     }
     const Camera before = calibration.camera();
-    calibration.observe(keyframe, {});
+    calibration.observe(keyframe, lens.k, {});
     constexpr double kMaxStep_px = 0.25 + 1e-9;  // the window can follow
     EXPECT_LE(std::abs(calibration.camera().cx_px - before.cx_px), kMaxStep_px);
     EXPECT_LE(std::abs(calibration.camera().cy_px - before.cy_px), kMaxStep_px);
@@ -148,14 +150,18 @@ TEST_F(SelfCalibrationTest, FindsALensThatNobodyKnewOf) {
     EXPECT_LT((calibration.lens().undistort(lens.distort(uv)) - uv).norm(), 0.5) << u_px;
   }
   SelfCalibration again(truth_, CameraRefinement::kPrincipalPoint);
-  again.begin_with(calibration.camera(), calibration.radial());
+  KeptKeyframe of_map;
+  of_map.camera = calibration.camera();
+  of_map.camera.fx_px *= 1.002;  // an adjusted map's
+  of_map.radial = calibration.radial();
+  again.begin_with(of_map);
   EXPECT_EQ(again.radial(), calibration.radial());
   drive_runs(truth_, again, radial);
   const Eigen::Vector2d side(0.0, 250.0);
   EXPECT_LT((again.lens().undistort(lens.distort(side)) - side).norm(), 0.5);
-  given_.fx_px += 1.0;
+  given_.cx_px += 20.0;
   SelfCalibration other(given_, CameraRefinement::kPrincipalPoint);
-  other.begin_with(calibration.camera(), calibration.radial());
+  other.begin_with(of_map);
   EXPECT_TRUE(other.radial().isZero()) << "another camera";
 }
 
@@ -199,13 +205,13 @@ TEST_F(SelfCalibrationTest, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
   SelfCalibration rescaled(camera, CameraRefinement::kAll);
   SelfCalibration restarted(camera, CameraRefinement::kAll);
   for (int i = 0; i < kLength; ++i) {
-    plain.observe(keyframe_of(i, 1.0), {});
+    plain.observe(keyframe_of(i, 1.0), {0.0, 0.0}, {});
     if (i == 8) {
       rescaled.rescale(3.0, Eigen::Vector3d::Zero());
       restarted.restart();
     }
-    rescaled.observe(keyframe_of(i, i < 8 ? 1.0 : 3.0), {});
-    restarted.observe(keyframe_of(i, 1.0), {});
+    rescaled.observe(keyframe_of(i, i < 8 ? 1.0 : 3.0), {0.0, 0.0}, {});
+    restarted.observe(keyframe_of(i, 1.0), {0.0, 0.0}, {});
     EXPECT_EQ(plain.estimate()->num_bundles, i + 1 < kLength ? 0 : 1);
   }
   EXPECT_EQ(restarted.estimate()->num_bundles, 0);
