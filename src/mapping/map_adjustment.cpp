@@ -14,6 +14,7 @@
 #include <ceres/normal_prior.h>
 
 #include "geometry/median.hpp"
+#include "geometry/radial_lens.hpp"
 #include "internal_check.hpp"
 #include "mapping/adjustment_errors.hpp"
 #include "mapping/pose_graph.hpp"

@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "features/front_end.hpp"
+#include "geometry/radial_lens.hpp"
 #include "odometry/estimator.hpp"
 #include "odometry/frame_clock.hpp"
 #include "odometry/image_turn.hpp"

@@ -16,6 +16,7 @@
 #include "features/front_end.hpp"
 #include "geometry/bundle.hpp"
 #include "geometry/pose_influence.hpp"
+#include "geometry/radial_lens.hpp"
 #include "mapping/kept_map.hpp"
 #include "odometry/road/image.hpp"
 #include "odometry/way.hpp"

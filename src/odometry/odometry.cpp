@@ -11,6 +11,7 @@
 #include <system_error>
 #include <thread>
 
+#include "geometry/radial_lens.hpp"
 #include "odometry/check_frame.hpp"
 #include "odometry/event_log.hpp"
 #include "odometry/odometry_loops.hpp"
