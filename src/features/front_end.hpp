@@ -24,7 +24,7 @@ struct Observation {
 /// All of one frame, ordered by track id.
 using Observations = std::vector<Observation>;
 
-/// Correspondences of two frames, in input pixels.
+/// Correspondences of two frames, in input pixels as Observation has them.
 struct Matches {
   std::vector<Eigen::Vector2d> prev_uv;
   std::vector<Eigen::Vector2d> cur_uv;
