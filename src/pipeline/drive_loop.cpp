@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <bit>
 #include <cerrno>
-#include <chrono>
 #include <fstream>
 #include <string>
 #include <string_view>
@@ -23,18 +22,14 @@
 namespace stemvo::pipeline {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-/// A file of rows that grows while frames are done. A buffer longer than the stream's own is
-/// written at once, so that a run that is killed leaves whole rows.
+/// A file of rows that grows with every frame: a run that is killed leaves whole rows.
 class GrowingFile {
  public:
   explicit GrowingFile(const std::filesystem::path& file)
       : file_(file), stream_(file, std::ios::binary) {}
 
-  void add(std::string_view rows) { rows_ += rows; }
-  void write() {
-    stream_ << std::exchange(rows_, {}) << std::flush;
+  void write(std::string_view rows) {
+    stream_ << rows << std::flush;
     if (!stream_ && status_) {
       status_ = fail(fmt::format("{}: cannot write: {}", file_.string(),
                                  std::generic_category().message(errno)));
@@ -45,7 +40,6 @@ class GrowingFile {
  private:
   std::filesystem::path file_;
   std::ofstream stream_;
-  std::string rows_;
   Status status_;
 };
 
@@ -69,8 +63,7 @@ class DriveLoop {
  public:
   DriveLoop(const Run& run, const RunProgress& progress) : run_(run), progress_(progress) {
     drive_.csv = frames_csv_header();
-    rows_.add(drive_.csv);
-    write_rows();
+    rows_.write(drive_.csv);
   }
 
   Drive drive() {
@@ -83,7 +76,6 @@ class DriveLoop {
     if (run_.sequence.stream) {
       end_stream(*run_.sequence.stream);
     }
-    write_rows();
     for (const GrowingFile* file : {&rows_, &kitti_, &tum_}) {
       keep_first(drive_.written, file->status());
     }
@@ -107,15 +99,12 @@ class DriveLoop {
     const Rigid3& written = drive_.trajectory.emplace_back(as_written(i, pose.world_from_camera));
     const std::string row = frames_csv_row(number, time_s, pose, written);
     drive_.csv += row;
-    rows_.add(row);
+    rows_.write(row);
     if (run_.request.on_frame) {
       run_.request.on_frame(number, pose, written);
     }
-    kitti_.add(kitti_row(written));
-    tum_.add(tum_row(time_s, written));
-    if (Clock::now() - last_written_ > std::chrono::seconds(1)) {
-      write_rows();
-    }
+    kitti_.write(kitti_row(written));
+    tum_.write(tum_row(time_s, written));
     keep_image(i, frame, pose);
     const std::size_t expected = expected_frames(run_.sequence, i + 1);
     drive_.interrupted = progress_ && !progress_(i + 1, expected) && i + 1 < run_.sequence.size();
@@ -175,13 +164,6 @@ class DriveLoop {
     }
   }
 
-  void write_rows() {
-    for (GrowingFile* file : {&rows_, &kitti_, &tum_}) {
-      file->write();
-    }
-    last_written_ = Clock::now();
-  }
-
   /// Frames in all are known now. An interrupt is the usual end of a live camera; a video that ends
   /// long before its container says is a warning.
   void end_stream(const StreamInfo& stream) {
@@ -216,7 +198,6 @@ class DriveLoop {
   GrowingFile rows_{run_.request.out_dir / "frames.csv"};
   GrowingFile kitti_{run_.request.out_dir / "trajectory_kitti.txt"};
   GrowingFile tum_{run_.request.out_dir / "trajectory_tum.txt"};
-  Clock::time_point last_written_;
   bool has_scale_ = false;  ///< lengths of the path are metres
 };
 

@@ -51,24 +51,17 @@ class LongRun : public ::testing::Test {
       rendered_drive({.frames = 400, .width_px = 620, .height_px = 188}) / "sequences/00";
 };
 
-TEST_F(LongRun, KeepsItsFramesOnDiskEveryTwoSeconds) {
+TEST_F(LongRun, HasItsFramesOnDiskWhileItRuns) {
   RunningProgram program(STEMVO_PROGRAM, arguments());
-  wait_for_poses();
-  std::ptrdiff_t rows = 0;
-  auto last_growth = std::chrono::steady_clock::now();
-  for (int i = 0; i < 250; ++i) {
+  constexpr std::ptrdiff_t kEnough = 20;
+  for (int i = 0; i < 3000 && num_lines("trajectory_kitti.txt") < kEnough; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    const auto now = std::chrono::steady_clock::now();
-    if (const std::ptrdiff_t found = num_lines("frames.csv"); found > rows) {
-      rows = found;
-      last_growth = now;
-    }
-    EXPECT_LT(now - last_growth, std::chrono::seconds(2));
   }
   program.send(SIGKILL);
   EXPECT_EQ(program.wait().exit_code, 128 + SIGKILL) << "the run was over too soon to tell";
-  EXPECT_GT(rows, 10);
-  EXPECT_GT(num_lines("trajectory_kitti.txt"), 10);
+  const std::ptrdiff_t num_poses = num_lines("trajectory_kitti.txt");
+  EXPECT_GE(num_poses, kEnough);
+  EXPECT_NEAR(num_lines("frames.csv"), num_poses + 1, 1) << "a row for each frame under a header";
   // Poses so far have true steps, as all have at the end.
   const auto poses = read_kitti_trajectory(out_ / "trajectory_kitti.txt").value();
   auto truth = read_kitti_trajectory(drive_ / "../../poses/00.txt").value();
