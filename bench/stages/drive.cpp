@@ -76,6 +76,7 @@ Chain run_chain() {
   const Config& config = result.config;
   const Stem stem = load_stem(config.stem);
   ContrastNormalization contrast(config.stem);
+  ContrastNormalization road_contrast({.tracking_resolution = TrackingResolution::kNative});
   const auto front_end = create_front_end(config.features);
   result.estimator = std::make_unique<WindowEstimator>(config, result.camera);
   const int last = static_cast<int>(frames().pixels.size()) - 1;
@@ -87,7 +88,8 @@ Chain run_chain() {
     frame.number = i;
     frame.time_s = frames().sequence.time_s(static_cast<std::size_t>(i));
     frame.image = pixels;
-    frame.road = std::make_shared<RoadImage>(make_road_image(result.images.back(), result.camera));
+    const ChannelImage road = road_contrast.apply(road_channel(pixels, result.camera));
+    frame.road = std::make_shared<RoadImage>(make_road_image(road, result.camera));
     frame.matches = front_end->process(result.images.back(), {i, frame.time_s});
     if (i == last) {
       result.matches = frame.matches;

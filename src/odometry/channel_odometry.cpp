@@ -29,6 +29,7 @@ ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera, c
     : given_camera_(camera),
       asks_road_(options.scale.source == ScaleSource::kCameraHeight),
       contrast_(contrast_options(options, camera)),
+      road_contrast_({.tracking_resolution = TrackingResolution::kNative}),
       front_end_(create_front_end(options.features)),
       image_turn_(camera),
       aligns_images_(options.features.method == FeatureMethod::kPatch) {
@@ -57,7 +58,8 @@ Frame ChannelOdometry::prepare(const Channel& channel,
   frame.pyramid = front_end_->prepare(seen, hints.mask);
   if (asks_road_) {
     const StageTimer timer(Stage::kRoadImage);
-    frame.road = std::make_shared<RoadImage>(make_road_image(seen, given_camera_));
+    const ChannelImage road = road_contrast_.apply(road_channel(image, given_camera_));
+    frame.road = std::make_shared<RoadImage>(make_road_image(road, given_camera_));
   }
   return frame;
 }

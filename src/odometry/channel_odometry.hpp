@@ -78,6 +78,7 @@ class ChannelOdometry {
   Camera given_camera_;  ///< the estimator owns the one in use
   bool asks_road_;
   ContrastNormalization contrast_;
+  ContrastNormalization road_contrast_;
   std::unique_ptr<FrontEnd> front_end_;
   std::unique_ptr<Estimator> estimator_;
 

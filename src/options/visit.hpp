@@ -116,7 +116,7 @@ inline const Rule kPixels = Rule::between(1e-3, 1000);
 template <Is<StemOptions> O, typename V>
 void visit(O& o, V&& v) {
   v("model", o.model, kAny,
-    "default, default_filter_2 or paper (built in), path of an .onnx, or made by hand, to compare "
+    "default, default_filter_0 or paper (built in), path of an .onnx, or made by hand, to compare "
     "with: gray, log "
     "(Laplacian of Gaussian), census (local contrast), input_layer (filters 0-2 = R, G, B)");
   v("filter", o.filter, Rule::between(-1, 1000000),

@@ -75,8 +75,8 @@ struct Drive {
 };
 
 /// Takes a run's frames through the odometry and keeps what each brings. Rows of frames.csv,
-/// trajectory_kitti.txt and trajectory_tum.txt are on the disk with each frame: a run that is killed
-/// loses none that was done.
+/// trajectory_kitti.txt and trajectory_tum.txt are on the disk with each frame: a run that is
+/// killed loses none that was done.
 [[nodiscard]] Drive run_drive(const Run& run, const RunProgress& progress);
 
 /// " for 11 of 12 frames", and why not for the others.

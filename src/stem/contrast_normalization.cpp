@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
 
 #include "internal_check.hpp"
+#include "stem/light_change.hpp"
 #include "stem/stem.hpp"
 
 namespace stemvo {
@@ -18,6 +20,10 @@ constexpr double kLeastContrast = 1e-5;
 constexpr double kMiddleGray = 128.0;
 // Share of the limits' distance: the next frame's limits nearly always lie no further away.
 constexpr double kMargin = 0.1;
+// The same: KITTI's scenes seem to change the light by up to 0.07 where only the camera moves.
+constexpr double kLightChange = 0.08;
+// The same: channels without low frequencies, whose squares spread less, do not show the light.
+constexpr double kLeastSpread = 0.08;
 // The same: beyond it the light has changed, and the old limits would cut off or hide the image.
 constexpr double kJump = 0.2;
 
@@ -69,9 +75,29 @@ PixelMap resized(const PixelMap& map, double factor) {
 
 ContrastNormalization::ContrastNormalization(const StemOptions& options) : options_(options) {}
 
+bool ContrastNormalization::follow_light(const cv::Mat& values) {
+  const cv::Mat before = std::exchange(light_values_, light_values(values));
+  if (!limits_.are_known) {
+    return false;
+  }
+  const double range = limits_.high - limits_.low;
+  const auto light = light_change(before, light_values_, kLeastSpread * range);
+  if (!light) {
+    return false;
+  }
+  const double low = light->gain * limits_.low + light->bias;
+  const double high = light->gain * limits_.high + light->bias;
+  if (std::max(std::abs(low - limits_.low), std::abs(high - limits_.high)) > kLightChange * range) {
+    limits_.low = low;
+    limits_.high = high;
+  }
+  return true;
+}
+
 ChannelImage ContrastNormalization::apply(const Channel& channel) {
   STEMVO_CHECK(channel.values.type() == CV_32FC1 && !channel.values.empty(),
                "a channel is one plane of floats");
+  const bool light_is_known = follow_light(channel.values);
   std::vector<float> samples = sample(channel.values);
   if (!samples.empty()) {
     const double margin = kMargin * (limits_.high - limits_.low);
@@ -79,7 +105,7 @@ ChannelImage ContrastNormalization::apply(const Channel& channel) {
     const double high = percentile(samples, options_.contrast_high_percent, limits_.high - margin);
     if (has_contrast(low, high)) {
       const double change = std::max(std::abs(low - limits_.low), std::abs(high - limits_.high));
-      const bool has_jumped = change > kJump * (limits_.high - limits_.low);
+      const bool has_jumped = !light_is_known && change > kJump * (limits_.high - limits_.low);
       const double memory = limits_.are_known && !has_jumped ? options_.contrast_memory : 0.0;
       limits_.low = memory * limits_.low + (1.0 - memory) * low;
       limits_.high = memory * limits_.high + (1.0 - memory) * high;
@@ -102,7 +128,10 @@ ChannelImage ContrastNormalization::apply(const Channel& channel) {
     values = &resized_;
   } else if (wanted > sampling) {  // an odd last row or column is left out
     const cv::Size size = channel.values.size() / 2;
-    cv::resize(channel.values({0, 0, 2 * size.width, 2 * size.height}), resized_, size, 0.0, 0.0,
+    constexpr float kKernel[] = {0.25F, 0.5F, 0.25F};
+    const cv::Mat1f kernel(1, 3, const_cast<float*>(kKernel));
+    cv::sepFilter2D(channel.values, smooth_, CV_32F, kernel, kernel);
+    cv::resize(smooth_({0, 0, 2 * size.width, 2 * size.height}), resized_, size, 0.0, 0.0,
                cv::INTER_AREA);
     values = &resized_;
   }

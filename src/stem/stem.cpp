@@ -50,13 +50,13 @@ Expected<int> choose_sampling(int asked, int stride, bool native_only) {
       native_only ? "the model allows its stride only," : "divisors of the stride", stride, asked));
 }
 
-/// The default network's best filter has a file of its own, which takes a fraction of the time.
+/// The default network's default filter has a file of its own, which takes a fraction of the time.
 std::string choose_model(const StemOptions& options, bool all_filters) {
-  constexpr int kFilter = 2;
+  constexpr int kFilter = 0;
   constexpr int kSampling_px = 2;
   const bool is_alone = (options.filter == -1 || options.filter == kFilter) &&
                         (options.sampling_px == 0 || options.sampling_px == kSampling_px);
-  return options.model == "default" && is_alone && !all_filters ? "default_filter_2"
+  return options.model == "default" && is_alone && !all_filters ? "default_filter_0"
                                                                 : options.model;
 }
 

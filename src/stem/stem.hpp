@@ -108,9 +108,10 @@ class Stem {
 
 /// Float channel -> 8-bit image: percentile limits that change slowly along the drive, so that a
 /// patch keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
-/// brings it to the input's size, or half of it, or the mean of 2x2 pixels where it is twice as
-/// fine (PixelMap is adjusted; no resampling between pixels). A channel without contrast becomes
-/// one gray and leaves the limits as they were; NaN becomes 0 (upsampled: its surroundings too).
+/// brings it to the input's size, or half of it, or half its size where it is twice as fine: 4x4
+/// pixels weighted 1 3 3 1 along x and y (a mean of 2x2 is aliased; PixelMap is adjusted). A
+/// channel without contrast becomes one gray and leaves the limits as they were; NaN becomes 0
+/// (upsampled: its surroundings too).
 class ContrastNormalization {
  public:
   /// In `options.tracking_resolution`, kAuto and kInputZoomed stand for
@@ -125,9 +126,14 @@ class ContrastNormalization {
     double high = 1.0;
   };
 
+  /// A patch keeps its gray value where the light changes at once. False: the frames do not tell.
+  bool follow_light(const cv::Mat& values);
+
   StemOptions options_;
-  Limits limits_;    ///< of the channels before
-  cv::Mat resized_;  ///< buffer
+  Limits limits_;         ///< of the channels before
+  cv::Mat light_values_;  ///< of the channel before
+  cv::Mat smooth_;        ///< buffer
+  cv::Mat resized_;       ///< buffer
 };
 
 }  // namespace stemvo

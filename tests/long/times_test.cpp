@@ -68,14 +68,18 @@ TEST_F(Times, DroppedFramesAndJitterCostLittleAndFramesTakenForEvenlySpacedMore)
   const Outcome all = run(whole());
   std::mt19937 random(1);
   std::uniform_real_distribution<double> share(0.0, 1.0);
-  std::vector<GivenFrame> jittered = whole();
-  for (GivenFrame& frame : jittered) {
-    frame.time_s += 0.2 * interval_s() * (2.0 * share(random) - 1.0);
+  constexpr int kNumDrives = 2;
+  double jittered_percent = 0.0;
+  for (int i = 0; i < kNumDrives; ++i) {
+    std::vector<GivenFrame> jittered = whole();
+    for (GivenFrame& frame : jittered) {
+      frame.time_s += 0.2 * interval_s() * (2.0 * share(random) - 1.0);
+    }
+    jittered_percent += run(jittered).t_rel_percent / kNumDrives;
   }
-  EXPECT_LT(run(jittered).t_rel_percent, 1.1 * all.t_rel_percent);
+  EXPECT_LT(jittered_percent, 1.1 * all.t_rel_percent);
   Outcome with_times;
   Outcome without;
-  constexpr int kNumDrives = 2;
   for (int i = 0; i < kNumDrives; ++i) {
     std::vector<GivenFrame> dropped = whole();
     std::erase_if(dropped,

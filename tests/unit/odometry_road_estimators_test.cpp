@@ -129,6 +129,35 @@ TEST(RoadDense, AnImageThatEndsAtTheHorizonShowsNoRoad) {
             "the image ends above the road");
 }
 
+TEST(RoadChannel, AnEdgeAcrossIsWhereItIsAndOneAlongIsNotSeen) {
+  constexpr double kEdge_px = 300.25;
+  for (const double focal_px : {700.0, 300.0}) {  // half of the size, all of it
+    for (const int type : {CV_8UC1, CV_8UC3}) {
+      const Camera camera{focal_px, focal_px, 60.0, 180.0, 121, 375};  // odd sides
+      cv::Mat across(375, 121, type);
+      cv::Mat along(375, 121, type);
+      for (int v = 0; v < 375; ++v) {
+        const double gray = 120.0 + 80.0 * std::tanh((v - kEdge_px) / 8.0);
+        across.row(v).setTo(cv::Scalar::all(gray));
+      }
+      for (int u = 0; u < 121; ++u) {
+        along.col(u).setTo(cv::Scalar::all(2.0 * u));
+      }
+      const Channel channel = road_channel(across, camera);
+      EXPECT_EQ(channel.map.scale.x(), focal_px > 500.0 ? 2.0 : 1.0);
+      cv::Mat column;
+      cv::max(channel.values.col(10), 0.0, column);
+      double sum = 0.0;
+      for (int v = 0; v < column.rows; ++v) {
+        sum += column.at<float>(v) * channel.map.to_input(Eigen::Vector2d(10, v)).y();
+      }
+      EXPECT_NEAR(sum / cv::sum(column)[0], kEdge_px, 0.05);
+      EXPECT_LT(channel.map.offset_px.y(), 180.0) << "it begins above the horizon";
+      EXPECT_LT(cv::norm(road_channel(along, camera).values, cv::NORM_INF), 1e-3);
+    }
+  }
+}
+
 /// Too few for the coarse grid: that must not be the end.
 TEST(RoadDense, ANarrowStripIsEnoughWhereTheScaleIsKnown) {
   RoadOptions options{.half_width_m = 0.1};

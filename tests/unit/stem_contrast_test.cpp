@@ -37,11 +37,11 @@ TEST(ContrastNormalization, LimitsFollowSlowly) {
       .contrast_low_percent = 0.0, .contrast_high_percent = 100.0, .contrast_memory = 0.75};
   ContrastNormalization contrast(options);
   (void)contrast.apply(ramp(0.0F, 100.0F));
-  // White moves from 100 to 0.75 * 100 + 0.25 * 116 = 104.
-  const ChannelImage second = contrast.apply(ramp(0.0F, 116.0F));
-  EXPECT_NEAR(second.pixels.at<unsigned char>(25, 0), 29.0 / 104.0 * 255.0, 1.0);
-  const ChannelImage third = contrast.apply(ramp(0.0F, 116.0F));
-  EXPECT_NEAR(third.pixels.at<unsigned char>(25, 0), 29.0 / 107.0 * 255.0, 1.0);
+  // White moves from 100 to 0.75 * 100 + 0.25 * 107 = 101.75.
+  const ChannelImage second = contrast.apply(ramp(0.0F, 107.0F));
+  EXPECT_NEAR(second.pixels.at<unsigned char>(75, 0), 80.25 / 101.75 * 255.0, 1.0);
+  const ChannelImage third = contrast.apply(ramp(0.0F, 107.0F));
+  EXPECT_NEAR(third.pixels.at<unsigned char>(75, 0), 80.25 / 103.06 * 255.0, 1.0);
 }
 
 /// A lamp goes on, a tunnel ends: nothing of the new image is cut off or lost in a few gray values.
@@ -90,6 +90,38 @@ TEST(ContrastNormalization, NotANumberHarmsNobodyElse) {
   EXPECT_EQ(dirty.apply(nothing).pixels.size(), cv::Size(10, 10));
 }
 
+/// What a low-pass channel shows of a street: bright above, dark below, blotches in between.
+cv::Mat1f blotches() {
+  cv::Mat1f values(180, 600);
+  cv::RNG random(5);
+  random.fill(values, cv::RNG::UNIFORM, 0.0, 1.0);
+  cv::GaussianBlur(values, values, {}, 6.0);
+  cv::normalize(values, values, 20.0, 120.0, cv::NORM_MINMAX);
+  values.rowRange(0, 50) += 60.0;
+  return values;
+}
+
+TEST(ContrastNormalization, PatchesKeepTheirGrayWhereTheExposureJumps) {
+  for (const double gain : {0.7, 1.25, 1.8}) {
+    ContrastNormalization contrast(StemOptions{});
+    const cv::Mat1f scene = blotches();
+    const cv::Mat before = contrast.apply({scene, {}}).pixels;
+    const cv::Mat after = contrast.apply({cv::Mat1f(gain * scene + 12.0), {}}).pixels;
+    EXPECT_LT(cv::norm(before, after, cv::NORM_INF), 3.0) << gain;
+  }
+}
+
+TEST(ContrastNormalization, PatchesKeepTheirGrayWhereAThingPassesAndTheLightStays) {
+  ContrastNormalization contrast(StemOptions{});
+  const cv::Mat1f scene = blotches();
+  const cv::Mat before = contrast.apply({scene, {}}).pixels;
+  cv::Mat1f passing = scene.clone();
+  passing.colRange(200, 380) += 50.0;
+  const cv::Mat after = contrast.apply({passing, {}}).pixels;
+  const cv::Rect beside(0, 0, 200, 180);
+  EXPECT_LT(cv::norm(before(beside), after(beside), cv::NORM_INF), 8.0);
+}
+
 TEST(ContrastNormalization, HalfIsNativeWhereTheChannelIsOfThatSize) {
   for (const double sampling : {2.0, 3.0}) {  // no whole factor leads from 3 to 2
     Channel channel = ramp(0.0F, 1.0F);
@@ -106,7 +138,7 @@ TEST(ContrastNormalization, HalfIsNativeWhereTheChannelIsOfThatSize) {
 }
 
 /// Gray and the input's colours: half the size for every channel, or comparisons are not fair.
-TEST(ContrastNormalization, HalfOfAFineChannelIsTheMeanOfTwoByTwo) {
+TEST(ContrastNormalization, HalfOfAFineChannelIsABinomialOfFourByFour) {
   Channel channel;
   channel.values.create(37, 51, CV_32F);
   cv::theRNG().state = 1;
@@ -118,8 +150,9 @@ TEST(ContrastNormalization, HalfOfAFineChannelIsTheMeanOfTwoByTwo) {
   ASSERT_EQ(half.pixels.size(), cv::Size(25, 18));
   const Eigen::Vector2d centre = half.map.to_input({7.0, 3.0});
   EXPECT_EQ(centre, Eigen::Vector2d(14.5, 6.5));
-  const double mean = cv::mean(channel.values({14, 6, 2, 2}))[0];
-  EXPECT_NEAR(half.pixels.at<unsigned char>(3, 7), mean, 1.5);
+  const cv::Mat weights = (cv::Mat_<float>(4, 1) << 0.125F, 0.375F, 0.375F, 0.125F);
+  const double smooth = cv::Mat(weights * weights.t()).dot(channel.values({13, 5, 4, 4}));
+  EXPECT_NEAR(half.pixels.at<unsigned char>(3, 7), smooth, 1.5);
 }
 
 /// Intensity-weighted centre of what is brighter than the middle.

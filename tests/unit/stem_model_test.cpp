@@ -24,7 +24,7 @@ TEST(Model, SaysWhatItIs) {
 }
 
 TEST(Model, TheBuiltInOnesAreThoseOfTheFolder) {
-  EXPECT_THAT(built_in_models(), ElementsAre("default", "default_filter_2", "paper"));
+  EXPECT_THAT(built_in_models(), ElementsAre("default", "default_filter_0", "paper"));
   for (const std::string& model : built_in_models()) {
     EXPECT_EQ(read_model(model).value(), read_all(STEMVO_SOURCE_DIR "/models/" + model + ".onnx"));
     EXPECT_TRUE(internal::open_model(model)) << model;

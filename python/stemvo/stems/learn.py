@@ -7,6 +7,8 @@ import types
 
 import click
 import numpy as np
+import onnx
+from google.protobuf.message import DecodeError
 
 from ..lab import warps
 from . import discriminant, drive, metadata, onnx_writer
@@ -57,7 +59,18 @@ def learn(scatter, nuisance, options):
     # Samples in the middle of stride x stride pixels, as those of the image made smaller by the stride.
     padding = (max(0, options.kernel - options.stride) // 2,) * 4
     layer_norm = stem_module.LayerNorm(np.ones(FILTERS), np.zeros(FILTERS), options.floor**2) if has_norm else None
-    return stem_module.Stem(weights, bias, stride=options.stride, mean=np.zeros(1), padding=padding, layer_norm=layer_norm), ratios
+    return stem_module.Stem(weights, bias, stride=options.stride, mean=np.zeros(1), padding=padding, repeats_border=True, layer_norm=layer_norm), ratios
+
+
+def put_first(stem, file):
+    """The filter 0 of another model, which may hold it several times, moved down."""
+    kernel = stem.weights.shape[-1]
+    try:
+        (weights,) = (onnx.numpy_helper.to_array(item) for item in onnx.load(file).graph.initializer if item.name == "weights")
+        stem.weights[0] = weights[0, :, :kernel, :kernel]
+    except (OSError, ValueError, DecodeError) as error:
+        raise ValueError(f"{file}: expected a model with `weights` of {kernel}x{kernel}, found: {error}") from error
+    stem.bias[0] = 0.0
 
 
 def whole(filters):
@@ -79,6 +92,8 @@ def alone(stem, options):
 def in_closed_form(options, file, said):
     scatter = collect([drive.Drive(folder) for folder in options.drives], options)
     stem, ratios = learn(scatter, discriminant.Nuisance(options.gain, options.offset, options.noise), options)
+    if options.first is not None:
+        put_first(stem, options.first)
     said |= {"network": "stemvo, learned on rendered drives", "default_filter": options.default_filter or 0, "filters": FILTERS}
     metadata.write(file, onnx_writer.build(stem), stem, **said)
     if options.default_filter is not None and options.stride % options.sampling == 0:
@@ -111,11 +126,15 @@ def by_gradient(options, file, said):
     click.echo(file)
 
 
+def _shown(value):
+    return f"{value:g}" if isinstance(value, float) else getattr(value, "name", value)
+
+
 def command_line(options):
     """The command that makes the same file again, without folders, which differ from machine to machine."""
     shown = {one.name: getattr(options, one.name) for one in command.params if one.name not in ("drives", "out")}
     return " ".join(["stemvo-lab learn", *(file.name for file in options.drives), "--out models",
-                     *(f"--{key.replace('_', '-')} {f'{value:g}' if isinstance(value, float) else value}" for key, value in shown.items() if value is not None)])
+                     *(f"--{key.replace('_', '-')} {_shown(value)}" for key, value in shown.items() if value is not None)])
 
 
 @click.command()
@@ -125,6 +144,7 @@ def command_line(options):
 @click.option("--objective", type=click.Choice(["matching", "tracking", "landing"]), default="matching", show_default=True,
               help="Tell points apart; the smallest covariance of a tracked translation; or land corners where they are")
 @click.option("--default-filter", type=click.IntRange(0, FILTERS - 1), metavar="K", help="Used where none is asked for (default: 0, which gets no file)")
+@click.option("--first", metavar="MODEL", type=click.Path(path_type=pathlib.Path), help="Its filter 0 takes the place of the first (made by --objective landing)")
 @click.option("--kernel", type=click.IntRange(4), default=8, show_default=True, metavar="PX", help="Side of a filter")
 @click.option("--stride", type=click.IntRange(1), default=2, show_default=True, metavar="PX", help="Of the graph")
 @click.option("--sampling", type=click.IntRange(1), default=2, show_default=True, metavar="PX", help="Between samples of the channel that it is meant for")

@@ -10,6 +10,8 @@ subtraction before it. Padding is written as numbers, never as "same": that depe
 of the size, and shifts by a pixel when the picture is cropped.
 """
 
+import dataclasses
+
 import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
@@ -128,6 +130,10 @@ def _add_stem(graph, stem, pick):
         stem = stem_module.fold_mean(stem)
     if np.any(stem.mean != 0.0):
         graph.add("Sub", "centred_image", graph.constant("mean", stem.mean.reshape(1, 3, 1, 1)))
+    if stem.repeats_border and any(stem.padding):
+        top, left, bottom, right = stem.padding
+        graph.add("Pad", "padded", graph.integers("around", [0, 0, top, left, 0, 0, bottom, right]), mode="edge")
+        stem = dataclasses.replace(stem, padding=(0, 0, 0, 0))
     if stem.filters == 1 and stem.layer_norm is None:
         _add_rows(graph, stem)
         return

@@ -27,7 +27,8 @@ def read_weights(path):
     if len(weights) != 1 or len(convolutions) != 1:
         raise ValueError(f"{path}: expected one convolution with `weights`, found {len(convolutions)}")
     attributes = {item.name: list(item.ints) for item in convolutions[0].attribute}
-    return weights[0], attributes["strides"][0], attributes["pads"]
+    around = [onnx.numpy_helper.to_array(item) for item in graph.initializer if item.name == "around"]  # onnx_writer's repeated border
+    return weights[0], attributes["strides"][0], around[0][[2, 3, 6, 7]].tolist() if around else attributes["pads"]
 
 
 def draw(weights, title, path):

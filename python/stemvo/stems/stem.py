@@ -20,7 +20,7 @@ class Stem:
     """y = weights (*) pad(image - mean) + bias, then the layer norm if there is one.
 
     image: RGB, 0..255, or gray where the weights have one plane. Padding adds zeros to (image - mean), as the networks do after their
-    normalisation; the division by their standard deviation is already inside the weights.
+    normalisation, or repeats the border's pixels; the division by their standard deviation is already inside the weights.
     """
 
     weights: np.ndarray  # C x 3 x kh x kw, or C x 1 x kh x kw
@@ -29,6 +29,7 @@ class Stem:
     mean: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))  # gray levels, RGB
     padding: tuple = (0, 0, 0, 0)  # top, left, bottom, right
     layer_norm: LayerNorm | None = None
+    repeats_border: bool = False  # beside the image, instead of zeros
 
     @property
     def filters(self):

@@ -6,12 +6,16 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "stem/stem.hpp"
+
 namespace stemvo {
 
 namespace {
 
 /// Reach of the local contrast, input pixels (at half size: its own, twice as wide).
 constexpr double kContrast_px = 8.0;
+/// Rows of a road channel above the horizon: its filters reach over them.
+constexpr int kAboveHorizon = 4;
 /// The centre of a pixel of half size lies between two of full size.
 const PixelMap kHalf{{2.0, 2.0}, {0.5, 0.5}};
 
@@ -72,6 +76,31 @@ int contrast_reach(const RoadImage& road) {
 }
 
 }  // namespace
+
+Channel road_channel(const cv::Mat& image, const Camera& camera) {
+  const bool is_half = choose_tracking_resolution(TrackingResolution::kAuto, FeatureMethod::kPatch,
+                                                  camera) == TrackingResolution::kHalf;
+  const int step = is_half && std::min(image.cols, image.rows) > 1 ? 2 : 1;
+  // Whole pixels of the result: an odd last row or column is left out.
+  const int cols = image.cols / step;
+  const int rows = image.rows / step;
+  const int above =
+      std::clamp(static_cast<int>(camera.cy_px) / step - kAboveHorizon, 0, std::max(0, rows - 1));
+  cv::Mat values = image({0, step * above, step * cols, step * (rows - above)});
+  if (image.channels() == 3) {
+    cv::cvtColor(values, values, cv::COLOR_RGB2GRAY);
+  }
+  values.convertTo(values, CV_32F);
+  cv::resize(values, values, {cols, rows - above}, 0.0, 0.0, cv::INTER_AREA);
+  const cv::Matx41f along_x(1.0F, 1.0F, 1.0F, 1.0F);
+  const cv::Matx41f along_y(-2.2F, -1.0F, 1.0F, 2.2F);
+  cv::sepFilter2D(values, values, CV_32F, along_x, along_y);
+  Channel channel{values, {}};
+  channel.map.scale.setConstant(step);
+  // Four pixels have their middle between two.
+  channel.map.offset_px = {-0.5, step * above - 0.5};
+  return channel;
+}
 
 RoadImage make_road_image(const ChannelImage& image, const Camera& camera) {
   RoadImage road{image.pixels, image.map, {}};

@@ -21,6 +21,11 @@ struct RoadImage {
   Level full;      ///< without values where too little is below the horizon
 };
 
+/// The channel that shows the road, whatever the points are tracked on: the derivative along y, as
+/// asphalt shows little but lines across. Gray or RGB of 8 bits and the camera's size; at half of
+/// it for long focal lengths.
+[[nodiscard]] Channel road_channel(const cv::Mat& image, const Camera& camera);
+
 [[nodiscard]] RoadImage make_road_image(const ChannelImage& image, const Camera& camera);
 
 /// At half the size; without values as above.
