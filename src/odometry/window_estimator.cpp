@@ -27,6 +27,8 @@ constexpr double kMinExplained = 0.5;
 constexpr double kHysteresis = 1.5;
 /// So many times the flow of a stationary frame is what errors of landmarks do to one that turns.
 constexpr double kTurnFlow = 3.0;
+/// Who stood is believed to stand for so long where things that pass hide the world.
+constexpr double kHidden_s = 3.0;
 /// A track this near moves as the world does, where a thing is the other choice.
 constexpr double kAgrees_px = 1.0;
 
@@ -106,9 +108,15 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   if (is_still) {  // few landmarks, but nothing moves
     return FrameState::kStationary;
   }
-  return relocate(frame, now, start)
-             ? accept_localization(frame, Rigid3(world_from_camera_), false, localized)
-             : measure_since_reference(frame, now, localized);
+  if (relocate(frame, now, start)) {
+    return accept_localization(frame, Rigid3(world_from_camera_), false, localized);
+  }
+  if (!is_initializing_ && stood_ && frame.time_s - view_.time_s < kHidden_s) {
+    // A map on what passes would go where that goes. Landmarks are looked for where they were.
+    std::fill(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{0});
+    return FrameState::kLost;
+  }
+  return measure_since_reference(frame, now, localized);
 }
 
 FrameState WindowEstimator::accept_localization(const Frame& frame,
@@ -142,13 +150,15 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
   const double turn_px =
       camera().mean_focal_px() * view_.world_from_camera.rotation.angularDistance(found.rotation);
   view_ = {frame.number, world_from_camera_, std::move(now), frame.time_s};
+  const bool is_nearly_still = !has_moved && turn_px < bound_px;
+  stood_ = is_still || (stood_ && is_nearly_still);
   if (is_still) {
     return FrameState::kStationary;
   }
   moving_points_ = view_.points;
-  return has_moved            ? FrameState::kTracking
-         : turn_px < bound_px ? FrameState::kLowParallax
-                              : FrameState::kRotating;
+  return has_moved         ? FrameState::kTracking
+         : is_nearly_still ? FrameState::kLowParallax
+                           : FrameState::kRotating;
 }
 
 void WindowEstimator::mark_outliers(const Matches& matches,

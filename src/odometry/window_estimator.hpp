@@ -171,6 +171,7 @@ class WindowEstimator final : public Estimator {
   Rigid3 road_pose_;                    ///< of the last frame whose road was measured
   bool is_last_localized_ = false;      ///< last_ has a pose that was measured
   bool was_static_ = false;             ///< the last image did not show new motion
+  bool stood_ = false;                  ///< as was the last frame that was localized
   std::optional<double> metric_sigma_;  ///< of the last frame's scale, where that is in metres
   std::optional<Similarity3> moved_;    ///< the world, on the frame in work: new from old
   int recognized_frame_ = -1;           ///< by the frame in work

@@ -32,15 +32,17 @@ class Disturbed : public ::testing::Test {
   fs::path sequence_;
 };
 
-/// A thing with a texture of its own that goes from the left to the right over a third of the
-/// image.
+/// A thing with a texture of its own that goes from the left to the right: over a third of the
+/// image, or `size` of it.
 struct Passing {
   cv::Mat texture;
   int first_frame;
   int speed_px;
 
-  Passing(int first, int speed, const cv::Size& image) : first_frame(first), speed_px(speed) {
-    texture.create(image.height * 3 / 4, image.width * 4 / 9, CV_8UC3);
+  Passing(int first, int speed, const cv::Size& image, cv::Size2d size = {4.0 / 9.0, 0.75})
+      : first_frame(first), speed_px(speed) {
+    texture.create(static_cast<int>(image.height * size.height),
+                   static_cast<int>(image.width * size.width), CV_8UC3);
     cv::RNG random(7);
     random.fill(texture, cv::RNG::UNIFORM, 0, 256);
     cv::GaussianBlur(texture, texture, {}, 2.0);
@@ -48,7 +50,8 @@ struct Passing {
   }
   void draw(int frame, cv::Mat& image) const {
     const int left = (frame - first_frame) * speed_px - texture.cols / 2;
-    const cv::Rect place(left, image.rows - texture.rows - 4, texture.cols, texture.rows);
+    const int bottom = std::max(image.rows - 4, texture.rows);
+    const cv::Rect place(left, bottom - texture.rows, texture.cols, texture.rows);
     const cv::Rect inside = place & cv::Rect({}, image.size());
     if (!inside.empty()) {
       texture(cv::Rect(inside.tl() - place.tl(), inside.size())).copyTo(image(inside));
@@ -118,6 +121,23 @@ TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
   EXPECT_LE(moved.translation.norm(), 0.02);  // measured, not held: 0.2 % of a depth of 10 m
   const int num_frames = static_cast<int>(result.poses.size());
   expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
+  expect_accurate(result.poses, drive, drive.event_end + 3, num_frames, 0.05, 0.3 * kDeg);
+}
+
+TEST_F(Disturbed, WhoStandsOpensNoMapOnWhatHidesTheWorld) {
+  const StateDrive drive = standing_drive();
+  copy("standing", drive);
+  const int begin = drive.event_begin + 2;
+  const Passing passing(begin, 80, kImage, {1.2, 1.0});
+  change(begin, drive.event_end, [&](int i, cv::Mat& image) { passing.draw(i, image); });
+  const StateRun result = run();
+  ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
+  const int num_frames = static_cast<int>(result.poses.size());
+  result.expect_states(drive.event_begin, num_frames,
+                       {"stationary", "lost", "low_parallax", "rotating", "tracking"});
+  const Rigid3 moved = result.poses[static_cast<std::size_t>(drive.event_begin)].inverse() *
+                       result.poses[static_cast<std::size_t>(drive.event_end) - 1];
+  EXPECT_LE(moved.translation.norm(), 0.2);  // 8.4 by a map on what passes
   expect_accurate(result.poses, drive, drive.event_end + 3, num_frames, 0.05, 0.3 * kDeg);
 }
 
