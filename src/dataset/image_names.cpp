@@ -205,7 +205,7 @@ bool are_of_one_time(const std::set<std::string>& a, const std::set<std::string>
   constexpr double kAlike = 0.8;
   const auto [first_a, last_a] = span_of(a);
   const auto [first_b, last_b] = span_of(b);
-  const auto [fewer, more] = std::minmax(a.size(), b.size());
+  const auto [fewer, more] = std::minmax({a.size(), b.size()});
   return fewer >= kMin && static_cast<double>(fewer) >= kAlike * static_cast<double>(more) &&
          std::min(last_a, last_b) - std::max(first_a, first_b) >
              kAlike * std::max(last_a - first_a, last_b - first_b);
