@@ -49,9 +49,10 @@ class Initializer {
                                                   const Camera& camera,
                                                   const WindowOptions& window_options) const;
 
- private:
   /// The motion of the camera, of things that move on their own told apart.
   [[nodiscard]] MeasuredMotion measure_world(const PixelPairs& pairs, const Camera& camera) const;
+
+ private:
   /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as
   /// well.
   void choose_motion(const PixelPairs& pairs, const Camera& camera, MeasuredMotion& motion) const;

@@ -159,8 +159,7 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
   return MotionRivals{std::move(world), plane, std::move(other_mask), is_contested};
 }
 
-void MovingTracks::begin(const Matches& matches, const std::vector<char>& moving_mask) {
-  clear();
+void MovingTracks::add(const Matches& matches, const std::vector<char>& moving_mask) {
   for (const int track_id : select<int>(matches.track_ids, moving_mask)) {
     evidence_.emplace(track_id, kFirstEvidence);
   }

@@ -62,7 +62,7 @@ class MovingTracks {
 
   void clear() { evidence_.clear(); }
   /// `moving_mask`, one per match: these move as a thing does.
-  void begin(const Matches& matches, const std::vector<char>& moving_mask);
+  void add(const Matches& matches, const std::vector<char>& moving_mask);
   /// A localized frame: tracks join that move as the things do, those leave that move as the world
   /// does. `fits_world`: one per match.
   void observe(const Matches& matches, const std::vector<char>& fits_world);

@@ -101,7 +101,12 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   for (const auto& turn : {frame.hints.prev_from_cur, image_turn}) {
     start = turn ? nearer_pose(start, predict(turn), seen, camera()) : start;
   }
-  const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
+  std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
+  if (found.has_value()) {
+    const auto of_world =
+        localize_without_thing(frame, found->world_from_camera, localized.inlier_mask);
+    found = of_world.has_value() ? of_world : found;
+  }
   if (found.has_value()) {
     return accept_localization(frame, found->world_from_camera, is_still, localized);
   }
@@ -238,7 +243,7 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
   if (is_tracking && motion.is_decisive && !mapper_.may_be_locating() &&
       open_window({frame.number, guess, current_points(frame.matches, motion.inlier_mask),
                    frame.time_s, frame.road})) {
-    moving_.begin(frame.matches, motion.moving_mask);
+    moving_.add(frame.matches, motion.moving_mask);
     return FrameState::kInitializing;
   }
   // Until there is a first map, the position is held; later the camera goes on as fast as it was.

@@ -89,6 +89,16 @@ class WindowEstimator final : public Estimator {
                                  const Rigid3& found,
                                  bool is_still,
                                  LocalizedFrame& localized);
+  /// Share of the image's cells whose matches since the last frame fit a motion well.
+  [[nodiscard]] double share_that_fits(const Rigid3& cur_from_last,
+                                       const Matches& matches,
+                                       const std::vector<char>& mask) const;
+  /// Where the pose found fits too little of the image, a thing that moves on its own may be behind
+  /// it. Without that the frame may fit another pose well: then this is the world's, and the
+  /// thing's tracks are moving_ and not in the mask.
+  [[nodiscard]] std::optional<Localization> localize_without_thing(const Frame& frame,
+                                                                   const Rigid3& found,
+                                                                   std::vector<char>& mask);
   void fuse_with_prediction(const Rigid3& before, const SeenLandmarks& seen, double parallax);
   /// Nothing is measured: the last motion goes on.
   void go_on(const Frame& frame) { world_from_camera_ = predict(trust_.trusted(frame.hints)); }

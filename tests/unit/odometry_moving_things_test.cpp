@@ -18,8 +18,9 @@ DriveTracks street(int num_frames, std::uint64_t seed) {
 }
 
 /// A plane full of corners before this part of the image, which it crosses at `px_per_frame`; what
-/// leaves it on one side comes in on the other as another track.
-void put_plane_before(DriveTracks& drive, double from, double to, double px_per_frame) {
+/// leaves it on one side comes in on the other as another track. It comes with a frame.
+void put_plane_before(
+    DriveTracks& drive, double from, double to, double px_per_frame, int first_frame = 0) {
   constexpr int kNumCorners = 150;
   const double left = from * drive.camera.width_px;
   const double width = (to - from) * drive.camera.width_px;
@@ -28,7 +29,7 @@ void put_plane_before(DriveTracks& drive, double from, double to, double px_per_
   for (int i = 0; i < kNumCorners; ++i) {
     corners.emplace_back(random.uniform(0.0, width), random.uniform(5.0, 370.0));
   }
-  for (int frame = 0; frame < drive.num_frames(); ++frame) {
+  for (int frame = first_frame; frame < drive.num_frames(); ++frame) {
     auto& seen = drive.observations[static_cast<std::size_t>(frame)];
     std::erase_if(seen, [&](const auto& point) {
       return point.second.x() >= left && point.second.x() < left + width;
@@ -65,6 +66,21 @@ TEST(MovingThings, ThePathIsTheWorldsFromTheFirstFrameOn) {
     EXPECT_GT(run.count(FrameState::kTracking), 34);
     expect_true_path(drive, estimator, 0.02);
   }
+}
+
+TEST(MovingThings, ALorryAheadAtOneDistanceDoesNotHoldTheRotationInATurn) {
+  std::vector<Rigid3> path(1);
+  for (int i = 1; i < 60; ++i) {
+    const double bend = std::clamp(0.0015 * (i - 20), 0.0, 0.02);
+    path.push_back(path.back() * Rigid3(so3_exp({0.0, bend, 0.0}), {0.5 * bend, 0.0, 0.8}));
+  }
+  DriveTracks drive(path, points_along(path, 400, 3), 0.1, 3);
+  put_plane_before(drive, 0.3, 0.72, 0.0, 8);
+  WindowEstimator estimator(config_without_scale(), drive.camera);
+  EstimatorRun run(estimator, drive);
+  run.add_all();
+  EXPECT_GT(run.count(FrameState::kTracking), 54);
+  expect_true_path(drive, estimator, 0.02);
 }
 
 TEST(StandingCamera, StaysWhileOthersPassBy) {
@@ -117,7 +133,7 @@ TEST(MovingTracks, TracksJoinAThingAndLeaveIt) {
   std::vector<char> named(fits_world.size(), 0);
   std::fill(named.begin() + 1, named.begin() + kFlock, char{1});
   named.back() = 1;
-  moving.begin(matches, named);
+  moving.add(matches, named);
   for (int frame = 1; frame <= 4; ++frame) {
     moving.observe(flock(frame, 3.0), fits_world);
   }
