@@ -9,13 +9,9 @@ namespace {
 using dataset::read_camera_file;
 
 constexpr const char* kGood =
-    "image_width: 640\n"
-    "image_height: 480\n"
-    "camera_model: pinhole\n"
-    "intrinsics: [520.9, 521.0, 325.1, 249.7]\n"
-    "distortion_model: radial-tangential\n"
-    "distortion_coefficients: [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]\n"
-    "rate_hz: 10\n"
+    "image_width: 640\nimage_height: 480\ncamera_model: pinhole\n"
+    "intrinsics: [520.9, 521.0, 325.1, 249.7]\ndistortion_model: radial-tangential\n"
+    "distortion_coefficients: [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]\nrate_hz: 10\n"
     "camera_height: 1.2\n";
 
 /// kGood with line `number` (from 1) replaced.
@@ -140,57 +136,25 @@ TEST_F(CameraFileTest, OddRateAndHeight) {
 }
 
 constexpr const char* kKalibr =
-    "cam0:\n"
-    "  T_cam_imu:\n"
-    "  - [0.0, 1.0, 0.0, 0.5]\n"
-    "  - [-1.0, 0.0, 0.0, 0.0]\n"
-    "  - [0.0, 0.0, 1.0, 0.0]\n"
-    "  - [0.0, 0.0, 0.0, 1.0]\n"
-    "  cam_overlaps: [1]\n"
-    "  camera_model: pinhole\n"
-    "  distortion_coeffs: [0.1, 0.02, -0.003, 0.0004]\n"
-    "  distortion_model: equidistant\n"
-    "  intrinsics: [190.0, 191.0, 254.0, 256.0]\n"
-    "  resolution: [512, 511]\n"
-    "  rostopic: /cam0/image_raw\n"
-    "  timeshift_cam_imu: -0.0125\n"
-    "cam1:\n"
+    "cam0:\n  T_cam_imu:\n  - [0.0, 1.0, 0.0, 0.5]\n  - [-1.0, 0.0, 0.0, 0.0]\n"
+    "  - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, 0.0, 0.0, 1.0]\n  cam_overlaps: [1]\n"
+    "  camera_model: pinhole\n  distortion_coeffs: [0.1, 0.02, -0.003, 0.0004]\n"
+    "  distortion_model: equidistant\n  intrinsics: [190.0, 191.0, 254.0, 256.0]\n"
+    "  resolution: [512, 511]\n  rostopic: /cam0/image_raw\n  timeshift_cam_imu: -0.0125\ncam1:\n"
     "  intrinsics: [1, 2, 3, 4]\n";
 
 constexpr const char* kOpenCv =
-    "%YAML:1.0\n"
-    "---\n"
-    "calibration_time: \"today\"\n"
-    "image_width: 640\n"
-    "image_height: 480\n"
-    "flags: 0\n"
-    "camera_matrix: !!opencv-matrix\n"
-    "   rows: 3\n"
-    "   cols: 3\n"
-    "   dt: d\n"
+    "%YAML:1.0\n---\ncalibration_time: \"today\"\nimage_width: 640\nimage_height: 480\nflags: 0\n"
+    "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
     "   data: [ 520., 0., 325.5, 0., 521., 249.5, 0., 0., 1. ]\n"
-    "distortion_coefficients: !!opencv-matrix\n"
-    "   rows: 5\n"
-    "   cols: 1\n"
-    "   dt: d\n"
-    "   data: [ 0.2, -0.7, 0., 0.001,\n"
-    "       0.9 ]\n"
-    "avg_reprojection_error: 0.2\n";
+    "distortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n"
+    "   data: [ 0.2, -0.7, 0., 0.001,\n       0.9 ]\navg_reprojection_error: 0.2\n";
 
 constexpr const char* kRos =
-    "image_width: 640\n"
-    "image_height: 480\n"
-    "camera_name: head\n"
-    "camera_matrix:\n"
-    "  rows: 3\n"
-    "  cols: 3\n"
-    "  data: [520, 0, 325.5, 0, 521, 249.5, 0, 0, 1]\n"
-    "distortion_model: plumb_bob\n"
-    "distortion_coefficients:\n"
-    "  rows: 1\n"
-    "  cols: 8\n"
-    "  data: [0.2, -0.7, 0, 0.001, 0.9, 0, 0, 0]\n"
-    "rectification_matrix:\n"
+    "image_width: 640\nimage_height: 480\ncamera_name: head\ncamera_matrix:\n  rows: 3\n"
+    "  cols: 3\n  data: [520, 0, 325.5, 0, 521, 249.5, 0, 0, 1]\ndistortion_model: plumb_bob\n"
+    "distortion_coefficients:\n  rows: 1\n  cols: 8\n"
+    "  data: [0.2, -0.7, 0, 0.001, 0.9, 0, 0, 0]\nrectification_matrix:\n"
     "  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
 
 TEST_F(CameraFileTest, KalibrsChain) {

@@ -1,31 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Recordings whose names, times, sizes or values would give a wrong path: refused, read right, or
 // said.
-#include "dataset/frame_files.hpp"
 #include "odometry/check_frame.hpp"
 #include "support/test.hpp"
+#include "support/written_images.hpp"
 
 namespace stemvo {
 namespace {
 
-class DoubtfulRecording : public ::testing::Test {
- protected:
-  /// The request of a folder that holds these images alone, 32x24 pixels, at 10 Hz.
-  FrameSourceRequest write_images(const std::vector<std::string>& names) const {
-    FrameSourceRequest request;
-    request.sequence_dir = temp_ / "drive";
-    fs::remove_all(request.sequence_dir);
-    fs::create_directories(request.sequence_dir);
-    for (const std::string& name : names) {
-      cv::imwrite((request.sequence_dir / name).string(), cv::Mat(24, 32, CV_8UC1, cv::Scalar(90)));
-    }
-    request.camera_file = temp_.file("camera.yaml",
-                                     "resolution: [32, 24]\nintrinsics: [30, 31, 15.5, 11.5]\n"
-                                     "distortion_model: none\nrate_hz: 10\n");
-    return request;
-  }
-  TempFolder temp_;
-};
+class DoubtfulRecording : public WrittenImages {};
 
 TEST_F(DoubtfulRecording, FramesThatAreMissingByTheirNumbersTakeTheirTime) {
   const auto near = [](double s) { return ::testing::DoubleNear(s, 1e-9); };
