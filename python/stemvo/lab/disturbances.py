@@ -87,10 +87,6 @@ def _map_levels(image, function):
     return cv2.LUT(image, _levels(function(np.arange(256.0))))
 
 
-def _gained(image, gain):
-    return _map_levels(image, lambda level: gain * level)
-
-
 def _blend(image, weight, gray):
     """weight * image + (1 - weight) * gray."""
     weight = np.asarray(weight, np.float32)
@@ -221,9 +217,9 @@ def _viewed(recording, share=1.0, factor=1.0):
 
 ALL = (
     Disturbance("exposure_steps", "light", "gain jumps every 12 frames, up to this factor", (1.2, 1.5, 2.0),
-                lambda image, factor, at: _gained(image, factor ** at._replace(frame=at.frame // 12).random.uniform(-1.0, 1.0))),
+                lambda image, factor, at: _map_levels(image, lambda level: level * factor ** at._replace(frame=at.frame // 12).random.uniform(-1.0, 1.0))),
     Disturbance("exposure_drift", "light", "gain swings slowly up to this factor", (1.5, 2.0, 3.0),
-                lambda image, factor, at: _gained(image, factor ** -math.sin(2.0 * math.pi * at.frame / 80.0))),
+                lambda image, factor, at: _map_levels(image, lambda level: level * factor ** -math.sin(2.0 * math.pi * at.frame / 80.0))),
     Disturbance("gamma", "light", "gray levels to this power", (1.5, 2.2, 3.0), lambda image, power, at: _map_levels(image, lambda level: 255.0 * (level / 255.0) ** power)),
     Disturbance("vignette", "light", "this share of the light is lost in the corners", (0.3, 0.6, 0.9), _vignette),
     Disturbance("dusk", "noise", "the light falls to this share in 50 frames, photon and read noise; gain makes up for half of the stops", (0.1, 0.03, 0.01), _dusk),

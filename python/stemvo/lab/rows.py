@@ -38,9 +38,7 @@ class Rows:
             self._rows.setdefault(tuple(cells[: self._num_key]), dict(zip(self.columns, cells)))
 
     def _write(self, rows):
-        text = io.StringIO()
-        csv.writer(text, lineterminator="\n").writerows(rows)
-        self._stream.write(text.getvalue())
+        csv.writer(self._stream, lineterminator="\n").writerows(rows)
         self._stream.flush()
         os.fsync(self._stream.fileno())
 

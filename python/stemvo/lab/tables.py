@@ -5,8 +5,6 @@ import pandas as pd
 
 _LATEX = {"\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
           "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}"}
-
-
 LEFT = ("frames", "method", "scale from", "alignment", "note", "ran on")  # columns of words
 PAGE_ROWS, MORE = 45, " (continued)"
 WIDEST = 5  # columns of a table in one of two columns of text

@@ -78,10 +78,8 @@ def workers(jobs=None, address=None, ray=True):
     if address and not on_ray:
         raise ValueError("--address: expected Ray to be installed, found none")
     made = Actors(jobs if address else jobs or len(os.sched_getaffinity(0)), address) if on_ray else Processes(jobs or len(os.sched_getaffinity(0)))
-    try:
+    with contextlib.closing(made):
         yield made
-    finally:
-        made.close()
 
 
 def run(workers, function, tasks, key_of=id, kept=None):

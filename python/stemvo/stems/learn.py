@@ -7,11 +7,9 @@ import types
 
 import click
 import numpy as np
-import onnx
-from google.protobuf.message import DecodeError
 
 from ..lab import warps
-from . import discriminant, drive, metadata, onnx_writer
+from . import discriminant, drive, metadata, onnx_writer, show
 from . import stem as stem_module
 
 FILTERS = 16
@@ -65,12 +63,10 @@ def learn(scatter, nuisance, options):
 def put_first(stem, file):
     """The filter 0 of another model, which may hold it several times, moved down."""
     kernel = stem.weights.shape[-1]
-    try:
-        (weights,) = (onnx.numpy_helper.to_array(item) for item in onnx.load(file).graph.initializer if item.name == "weights")
-        stem.weights[0] = weights[0, :, :kernel, :kernel]
-    except (OSError, ValueError, DecodeError) as error:
-        raise ValueError(f"{file}: expected a model with `weights` of {kernel}x{kernel}, found: {error}") from error
-    stem.bias[0] = 0.0
+    weights = show.read_weights(file)[0][0, :, :kernel, :kernel]
+    if weights.shape != stem.weights[0].shape:
+        raise ValueError(f"{file}: expected `weights` of {kernel}x{kernel} on one plane, found {weights.shape}")
+    stem.weights[0], stem.bias[0] = weights, 0.0
 
 
 def whole(filters):
