@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "odometry/tracks.hpp"
@@ -57,7 +58,7 @@ std::optional<Localization> WindowEstimator::localize_without_thing(const Frame&
                        predict(motion.cur_from_prev.rotation.conjugate()), camera(), localization_);
   if (world.has_value()) {
     moving_.add(matches, thing);
-    mask = rest;
+    mask = std::move(rest);
   }
   return world;
 }
