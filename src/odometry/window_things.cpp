@@ -18,7 +18,16 @@ namespace {
 /// only nearly fits, does not.
 constexpr double kFits_px = 0.7;
 constexpr double kMinFitting = 0.7;
-constexpr double kMinGain = 1.1;  ///< of another motion, thing included: a turn may be no thing
+/// A thing of so much of the image moves on its own: the other motion fits it hardly, the rest of
+/// the image well, and more of all than the pose does. Smaller ones are outvoted; and what bends
+/// with a rolling shutter is no thing.
+constexpr double kMinThing = 0.3;
+constexpr double kMaxOfThing = 0.2;
+constexpr double kMinOfRest = 0.6;
+constexpr double kMinGain = 1.05;
+/// Where the camera hardly turns, a thing that keeps its distance does no harm, and who brakes
+/// before crossing cars is not made to move with them.
+constexpr double kMinTurn_px = 2.0;
 
 }  // namespace
 
@@ -48,9 +57,15 @@ std::optional<Localization> WindowEstimator::localize_without_thing(const Frame&
   std::vector<char> rest(mask.size());
   std::ranges::transform(mask, thing, rest.begin(),
                          [](char is_kept, char moves) { return is_kept != 0 && moves == 0; });
-  if (rest == mask || share_that_fits(motion.cur_from_prev, matches, rest) < kMinFitting ||
-      share_that_fits(motion.cur_from_prev, matches, mask) <
-          kMinGain * share_that_fits(cur_from_last, matches, mask)) {
+  const auto fits = [&](const std::vector<char>& party) {
+    return share_that_fits(motion.cur_from_prev, matches, party);
+  };
+  const double turn_px = camera().mean_focal_px() * motion.cur_from_prev.angle_rad();
+  const double size =
+      cell_votes(matches.cur_uv, thing) / std::max(cell_votes(matches.cur_uv, mask), 1.0);
+  if (turn_px < kMinTurn_px || size < kMinThing || fits(thing) > kMaxOfThing ||
+      fits(rest) < kMinOfRest ||
+      fits(mask) < kMinGain * share_that_fits(cur_from_last, matches, mask)) {
     return std::nullopt;
   }
   const auto world =
