@@ -106,7 +106,8 @@ TEST(RefinedLens, ShowsTheWorldAsTheRefinedViewDoes) {
     const Eigen::Vector2d seen(view.fx_px * (1.0 + change[2]) * bent.x() + view.cx_px + change[0],
                                view.fy_px * (1.0 + change[2]) * bent.y() + view.cy_px + change[1]);
     const Eigen::Vector2d in_frame = source_pixel(lens, view, seen);
-    EXPECT_LE((refined.project(distort(refined, xy).homogeneous()) - in_frame).norm(), 0.3);
+    const Eigen::Vector2d ours = refined.project(distort(refined, xy).homogeneous());
+    EXPECT_LE((ours - in_frame).norm(), 0.3);
   }
 }
 

@@ -73,11 +73,25 @@ TEST_F(KittiSequenceTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
   EXPECT_LT((truth[1].translation - Eigen::Vector3d(0, 0, 2)).norm(), 1e-12);
 }
 
+TEST_F(KittiSequenceTest, MorePosesThanImagesAreSaid) {
+  EXPECT_THAT(open_kitti(folder_)->warnings, Not(Contains(HasSubstr("poses for"))));
+  EXPECT_THAT(open_kitti(folder_, frames("1:3"))->warnings, Not(Contains(HasSubstr("poses for"))));
+  write(poses(), pose_lines(8));
+  EXPECT_THAT(open_kitti(folder_)->warnings, Contains(HasSubstr("07.txt: 8 poses for 4 frames")));
+}
+
+TEST_F(KittiSequenceTest, NoPoseFileMeansNoTruth) {
+  fs::remove(poses());
+  const auto sequence = open_kitti(folder_);
+  EXPECT_FALSE(sequence->ground_truth);
+}
+
 TEST_F(KittiSequenceTest, GivenPoseFileIsTakenInsteadAndMustExist) {
   write(root_ / "other.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 9\n");
   SequenceOptions options = frames(":2");
   options.ground_truth = root_ / "other.txt";
-  EXPECT_NEAR(open_kitti(folder_, options)->ground_truth->poses.back().translation.z(), 9.0, 1e-12);
+  const auto sequence = open_kitti(folder_, options);
+  EXPECT_NEAR(sequence->ground_truth->poses.back().translation.z(), 9.0, 1e-12);
   options.ground_truth = root_ / "absent.txt";
   EXPECT_THAT(open_error(options), HasSubstr("absent.txt"));
 }
@@ -116,6 +130,8 @@ TEST_F(KittiSequenceTest, CalibrationProblems) {
   const fs::path file = folder_ / "calib.txt";
   write(file, "P0: 90 0 3 0 0 90 2 0 0 0 1 0\n");
   EXPECT_THAT(open_error(), HasSubstr("expected a row 'P2:'"));
+  write(file, "\nP2: 100 0 nan 5 0 101 3 0 0 0 1 0\n");
+  EXPECT_THAT(open_error(), HasSubstr("calib.txt:2: expected a finite number, found 'nan'"));
   write(file, "P2: 100 0 4 5 0 101 3 0 0 0 1\n");
   EXPECT_THAT(open_error(), HasSubstr("calib.txt:1: expected 12 numbers, found 11"));
   write(file, "P2: 0 0 4 5 0 101 3 0 0 0 1 0\n");
@@ -124,6 +140,8 @@ TEST_F(KittiSequenceTest, CalibrationProblems) {
   EXPECT_THAT(open_error(), HasSubstr("pinhole"));
   write(file, "corner_dist: 1.0\r\nP_rect_02: 100 0 4 5 0 101 3 0 0 0 1 0\r\n");
   EXPECT_EQ(open_error(), "no error") << "the raw data's name, lines ended by CR LF";
+  fs::remove(file);
+  EXPECT_THAT(open_error(), HasSubstr("calib.txt: cannot read: No such file"));
 }
 
 TEST_F(KittiSequenceTest, ImagesOfAnotherSizeThanTheRawCalibrationSaysAreRefused) {
@@ -144,12 +162,29 @@ TEST_F(KittiSequenceTest, ImagesOfAnotherSizeThanTheRawCalibrationSaysAreRefused
   EXPECT_THAT(error_with("S_rect_02: 1e20 -1\n" + camera), HasSubstr("expected images of"));
 }
 
+TEST_F(KittiSequenceTest, TimesProblems) {
+  const fs::path file = folder_ / "times.txt";
+  write(file, "0\n0.1\n0.2\n");
+  EXPECT_THAT(open_error(), HasSubstr("each of 4 images, found 3"));
+  write(file, "0\n0.1\nx\n0.3\n");
+  EXPECT_THAT(open_error(), HasSubstr("times.txt:3: expected a finite number, found 'x'"));
+  write(file, "0\n0.1\n0.1\n0.3\n");
+  EXPECT_THAT(open_error(), HasSubstr("times.txt:3: expected a time after 0.1"));
+  fs::remove(file);
+  EXPECT_THAT(open_error(), HasSubstr("times.txt"));
+}
+
 TEST_F(KittiSequenceTest, PoseProblems) {
   write(poses(), pose_lines(3));
   EXPECT_THAT(open_error(), HasSubstr("found 3 poses"));
   EXPECT_EQ(open_error(frames("0:3")), "no error");
   write(poses(), "1 2 3\n");
   EXPECT_THAT(open_error(), HasSubstr("07.txt:1"));
+}
+
+TEST_F(KittiSequenceTest, RangeOutsideTheFolder) {
+  EXPECT_THAT(open_error(frames("2:5")), HasSubstr("inside 0:4, found --frames 2:5"));
+  EXPECT_THAT(open_error(frames("4:")), HasSubstr("inside 0:4, found --frames 4:"));
 }
 
 TEST_F(KittiSequenceTest, BrokenFirstImageDoesNotHideTheSize) {
@@ -193,6 +228,7 @@ TEST(KittiCamera, RowsOfTheSameCameraChangeAndTheReaderTakesThem) {
   const TempFolder folder;
   const auto text =
       dataset::replace_kitti_camera(folder.file("calib.txt", kText), kGiven, kRefined);
+  ASSERT_TRUE(text.has_value()) << text.error().message;
   const auto file = folder.file("refined.txt", *text);
   for (int i = 0; i < 4; ++i) {
     const auto camera = dataset::read_kitti_camera(file, i).value();
@@ -224,6 +260,14 @@ TEST(KittiCamera, BaselinesStay) {
   EXPECT_NEAR(values[3], expected, 1e-9);
   EXPECT_NEAR(values[7], 707.0 * offset.y() / 700.0 + 178.0 * 0.004, 1e-9);
   EXPECT_NEAR(values[11], 0.004, 1e-12);
+}
+
+TEST(KittiCamera, UnchangedCameraGivesTheSameNumbers) {
+  const TempFolder folder;
+  const auto file = folder.file("calib.txt", kText);
+  const auto text = dataset::replace_kitti_camera(file, kGiven, kGiven).value();
+  EXPECT_THAT(text, HasSubstr("P1: 7.000000000000e+02 0.000000000000e+00 6.000000000000e+02 "
+                              "-3.500000000000e+02"));
 }
 
 }  // namespace

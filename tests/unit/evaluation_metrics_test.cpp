@@ -34,6 +34,17 @@ Trajectory moved(const Trajectory& poses, const Rigid3& by) {
   return result;
 }
 
+TEST(Evaluate, TruthAgainstItselfIsZero) {
+  const Trajectory truth = circle(500, 0.01);
+  const Metrics metrics = evaluate(truth, truth);
+  EXPECT_LE(metrics.t_rel_percent.value(), 1e-9);
+  EXPECT_LE(metrics.r_rel_deg_per_100m.value(), 1e-9);
+  EXPECT_LE(metrics.average_offset_m, 1e-12);
+  EXPECT_LE(metrics.ate_rmse.none_m, 1e-12);
+  EXPECT_LE(metrics.ate_rmse.sim3_m, 1e-9);
+  EXPECT_LE(metrics.rpe_rotation_deg, 1e-9);
+}
+
 // A segment of nominally L metres ends at the first frame beyond L: L + 1 m with steps of 1 m. 1 %
 // too long a step is an error of 0.01 (L + 1) m over L m.
 TEST(Evaluate, OnePercentOfScaleIsOnePercentOfTranslation) {
@@ -132,6 +143,11 @@ TEST(Evaluate, WhereTheFilesBeginDoesNotMatter) {
   EXPECT_NEAR(a.average_offset_m, b.average_offset_m, 1e-9);
   EXPECT_NEAR(a.ate_rmse.none_m, b.ate_rmse.none_m, 1e-9);
   EXPECT_NEAR(a.ate_rmse.sim3_m, b.ate_rmse.sim3_m, 1e-9);
+}
+
+TEST(Evaluate, RefusesUnequalAndEmptyTrajectories) {
+  EXPECT_THROW((void)evaluate(Trajectory(2), Trajectory(3)), std::logic_error);
+  EXPECT_THROW((void)evaluate({}, {}), std::logic_error);
 }
 
 TEST(AlignTrajectory, UndoesAPlantedSimilarity) {

@@ -54,6 +54,14 @@ TEST(KittiTrajectory, ReadsWindowsLineEndsTabsAndEmptyLinesAtTheEnd) {
   EXPECT_EQ((*found)[1].translation, Eigen::Vector3d(5, 0, 7));
 }
 
+TEST(KittiTrajectory, MakesRoundedRotationsExact) {
+  const TempFolder folder;
+  const auto file = folder.file("a.txt", "0.9999 0 0.0141 0 0 1 0 0 -0.0141 0 0.9999 0\n");
+  const Expected<Trajectory> found = read_kitti_trajectory(file);
+  const Eigen::Matrix3d rotation = found->front().rotation_matrix();
+  EXPECT_TRUE((rotation.transpose() * rotation).isIdentity(1e-14));
+}
+
 TEST(KittiTrajectory, ABrokenLineIsNamedWithFileAndLine) {
   const TempFolder folder;
   for (const auto& [line, complaint] :
@@ -76,6 +84,22 @@ TEST(KittiTrajectory, ABrokenLineIsNamedWithFileAndLine) {
   }
 }
 
+TEST(KittiTrajectory, NamesAFileThatIsMissingEmptyOrAFolder) {
+  const TempFolder folder;
+  const auto message = [](const std::filesystem::path& file) {
+    return message_of(read_kitti_trajectory(file));
+  };
+  EXPECT_THAT(message(folder / "none.txt"), HasSubstr("none.txt: cannot read: No such file"));
+  EXPECT_THAT(message(folder.path()), HasSubstr("found a folder"));
+  EXPECT_THAT(message(folder.file("empty.txt", "")), HasSubstr("empty.txt: expected at least one"));
+  EXPECT_THAT(message(folder.file("blank.txt", "\n \n")), HasSubstr("expected at least one pose"));
+}
+
+TEST(KittiTrajectory, SaysThatItCannotBeWritten) {
+  EXPECT_THAT(message_of(write_kitti_trajectory("/nonexistent/poses.txt", bent_path(1))),
+              HasSubstr("/nonexistent/poses.txt: cannot write: "));
+}
+
 TEST(TumTrajectory, ComesBackAsItWasWritten) {
   const TempFolder folder;
   const Trajectory poses = bent_path(20);
@@ -87,6 +111,38 @@ TEST(TumTrajectory, ComesBackAsItWasWritten) {
   const Expected<PoseFile> found = read_pose_file(folder / "tum.txt");
   expect_near(found->poses, poses, 1e-8);
   EXPECT_THAT(found->timestamps_s, ::testing::Pointwise(::testing::DoubleNear(1e-9), times_s));
+}
+
+TEST(RelativeToFirst, StartsAtTheIdentityAndKeepsTheMotions) {
+  const Trajectory poses = bent_path(5);
+  const Trajectory moved = relative_to_first(poses);
+  EXPECT_EQ(moved.front().matrix(), Rigid3().matrix());
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const Rigid3 before = poses[i - 1].inverse() * poses[i];
+    const Rigid3 after = moved[i - 1].inverse() * moved[i];
+    EXPECT_LE((before.matrix() - after.matrix()).cwiseAbs().maxCoeff(), 1e-9);
+  }
+  EXPECT_TRUE(relative_to_first({}).empty());
+}
+
+TEST(RescaleSteps, KeepsDirectionsAndRotationsAndTakesTheTrueLengths) {
+  Trajectory estimate(4);
+  estimate[1] = Rigid3(so3_exp({0, 0.1, 0}), {0, 0, 10});    // ahead, far too long
+  estimate[2] = Rigid3(so3_exp({0, 0.2, 0}), {0, 0, 10});    // stands still
+  estimate[3] = Rigid3(so3_exp({0, 0.3, 0}), {0.3, 0, 10});  // to the right, too short
+  Trajectory truth(4);
+  truth[1].translation = {0, 0, 1};
+  truth[2].translation = {0, 0, 2};
+  truth[3].translation = {0, 3, 6};  // 5 m
+  const Trajectory rescaled = rescale_steps(estimate, truth);
+  ASSERT_EQ(rescaled.size(), 4U);
+  EXPECT_LE((rescaled[1].translation - Eigen::Vector3d(0, 0, 1)).norm(), 1e-12);
+  EXPECT_LE((rescaled[2].translation - Eigen::Vector3d(0, 0, 1)).norm(), 1e-12);
+  EXPECT_LE((rescaled[3].translation - Eigen::Vector3d(5, 0, 1)).norm(), 1e-12);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(rescaled[i].rotation.coeffs(), estimate[i].rotation.coeffs());
+  }
+  EXPECT_THROW((void)rescale_steps(estimate, Trajectory(3)), std::logic_error);
 }
 
 TEST(PoseFile, FormatsAreToldByTheirRows) {

@@ -66,6 +66,47 @@ TEST(AlignPositions, FindsThePlantedSimilarity) {
   }
 }
 
+TEST(AlignPositions, Se3LeavesTheScale) {
+  SceneRandom random(1);
+  const Points source = random_points(random, 30);
+  const Similarity3 planted = random_similarity(random, 1.0);
+  const Similarity3 found = align_positions(source, transform(planted, source), Alignment::kSe3);
+  EXPECT_EQ(found.scale, 1.0);
+  EXPECT_THAT(found.rotation.toRotationMatrix(), IsNear(planted.rotation.toRotationMatrix(), 1e-9));
+  Similarity3 larger = planted;
+  larger.scale = 3.0;
+  const Similarity3 of_larger = align_positions(source, transform(larger, source), Alignment::kSe3);
+  EXPECT_EQ(of_larger.scale, 1.0);
+  EXPECT_THAT(of_larger.rotation.toRotationMatrix(),
+              IsNear(planted.rotation.toRotationMatrix(), 1e-9));
+}
+
+TEST(AlignPositions, NoSmallChangeFitsNoisyPointsBetter) {
+  SceneRandom random(2);
+  const Points source = random_points(random, 50);
+  Points target = transform(random_similarity(random, 2.0), source);
+  for (Eigen::Vector3d& point : target) {
+    point += 3.0 * random.direction();
+  }
+  const Similarity3 best = align_positions(source, target, Alignment::kSim3);
+  const double least = squared_error(best, source, target);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double step : {-1e-4, 1e-4}) {
+      Similarity3 turned = best;
+      turned.rotation = so3_exp(step * Eigen::Vector3d::Unit(axis)) * best.rotation;
+      Similarity3 moved = best;
+      moved.translation(axis) += step;
+      EXPECT_GT(squared_error(turned, source, target), least);
+      EXPECT_GT(squared_error(moved, source, target), least);
+    }
+  }
+  for (const double factor : {0.9999, 1.0001}) {
+    Similarity3 scaled = best;
+    scaled.scale *= factor;
+    EXPECT_GT(squared_error(scaled, source, target), least);
+  }
+}
+
 TEST(AlignPositions, APathTheOtherWayKeepsToTheSizeOfTheTrueOne) {
   const Points source = {{0, 0, 0}, {0, 0, -100}, {0, 0, -200}};
   const Points target = {{0, 0, 0}, {0, 0, 1}, {0, 0, 2}};

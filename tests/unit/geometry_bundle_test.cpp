@@ -145,6 +145,13 @@ TEST(Bundle, APointBehindAPoseIsRefusedAndNothingChanges) {
   EXPECT_EQ(bundle.camera_from_world[4].translation, before.camera_from_world[4].translation);
 }
 
+TEST(Bundle, ObservationsOutOfOrderAreRefused) {
+  const DriveTracks drive(6, 0.0, 7);
+  Bundle bundle = bundle_of(drive, 1.0);
+  std::swap(bundle.observations[0], bundle.observations[1]);
+  EXPECT_ANY_THROW(solve_bundle_adjustment(bundle, {}));
+}
+
 TEST(IntrinsicsDelta, ItsPartsMakeItUp) {
   IntrinsicsDelta total;
   IntrinsicsDelta first;

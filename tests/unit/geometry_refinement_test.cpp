@@ -119,6 +119,24 @@ TEST(RefineRelativePose, CostIsTheRobustSampsonDistanceInPixels) {
   EXPECT_NEAR(result.cost, expected, 1e-9 * expected);
 }
 
+TEST(RefineRelativePose, UnusableInputComesBackUnchanged) {
+  const Scene scene = make_scene({.seed = 6});
+  const std::span<const Eigen::Vector2d> prev(scene.prev_uv);
+  const std::span<const Eigen::Vector2d> cur(scene.cur_uv);
+  const Rigid3 start(scene.cur_from_prev.rotation, {0.1, 0.2, 0.9});
+  const auto unchanged = [&](const RefinedMotion& result, const Rigid3& motion) {
+    EXPECT_EQ(result.cur_from_prev.translation, motion.translation);
+    EXPECT_EQ(result.cur_from_prev.rotation.coeffs(), motion.rotation.coeffs());
+    EXPECT_EQ(result.cost, 0.0);
+  };
+  unchanged(refine_relative_pose(start, {{}, {}}, scene.camera), start);
+  unchanged(refine_relative_pose(start, {prev.first(4), cur.first(4)}, scene.camera), start);
+  const Rigid3 no_translation(start.rotation, Eigen::Vector3d::Zero());
+  unchanged(refine_relative_pose(no_translation, {prev, cur}, scene.camera), no_translation);
+  EXPECT_THROW(static_cast<void>(refine_relative_pose(start, {prev, {}}, scene.camera)),
+               std::logic_error);
+}
+
 TEST(RefineRelativePose, DegenerateMatchesStayFinite) {
   const Scene scene = make_scene({.seed = 6});
   const Points same(200, Eigen::Vector2d(300.0, 100.0));
@@ -164,6 +182,19 @@ TEST(RefineRotation, NoiseAndOutliers) {
   EXPECT_LE(median(errors), 1.5e-4);
 }
 
+TEST(RefineRotation, DegenerateInputStaysFinite) {
+  Scene scene = rotating_scene({.seed = 3});
+  const std::span<const Eigen::Vector2d> prev(scene.prev_uv);
+  const std::span<const Eigen::Vector2d> cur(scene.cur_uv);
+  const Eigen::Quaterniond start = so3_exp({0.01, 0.0, 0.0});
+  for (const std::size_t n : {0U, 1U}) {
+    EXPECT_EQ(refine_rotation(start, {prev.first(n), cur.first(n)}, scene.camera).coeffs(),
+              start.coeffs());
+  }
+  const Points same(200, Eigen::Vector2d(300.0, 100.0));
+  EXPECT_TRUE(refine_rotation(start, {same, same}, scene.camera).coeffs().allFinite());
+}
+
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 /// A camera with fx != fy, to catch a factor that is missing on one axis.
@@ -199,6 +230,14 @@ TEST(SampsonTerm, DerivativesAgreeWithNumericOnes) {
     analytic << term.by_rotation, term.by_translation;
     EXPECT_THAT(analytic, IsNear(numeric, 1e-6 * (1.0 + numeric.norm()))) << "match " << i;
   }
+}
+
+TEST(SampsonTerm, BothPointsAtTheEpipolesSayNothing) {
+  const Eigen::Vector3d ahead = Eigen::Vector3d::UnitZ();
+  const internal::SampsonTerm term = internal::sampson_term(
+      Eigen::Matrix3d::Identity(), ahead, squared_inverse_focal(uneven_camera()), ahead, ahead);
+  EXPECT_EQ(term.residual_px, 0.0);
+  EXPECT_EQ(term.by_rotation.norm() + term.by_translation.norm(), 0.0);
 }
 
 }  // namespace

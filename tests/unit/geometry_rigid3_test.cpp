@@ -8,6 +8,23 @@
 namespace stemvo {
 namespace {
 
+TEST(Rigid3, TransformsPointsAsItsMatrixDoes) {
+  SceneRandom random(1);
+  const Rigid3 motion = random.motion(3.0);
+  const Eigen::Vector3d point(1.0, -2.0, 5.0);
+  const Eigen::Vector3d expected = motion.matrix() * point.homogeneous();
+  EXPECT_THAT(motion * point, IsNear(expected, 1e-14));
+}
+
+TEST(Rigid3, ProductAppliesTheRightFactorFirst) {
+  SceneRandom random(2);
+  const Rigid3 b_from_a = random.motion(3.0);
+  const Rigid3 c_from_b = random.motion(3.0);
+  const Eigen::Vector3d x_in_a(0.3, 4.0, -1.0);
+  const Eigen::Vector3d x_in_c = c_from_b * (b_from_a * x_in_a);
+  EXPECT_THAT((c_from_b * b_from_a) * x_in_a, IsNear(x_in_c, 1e-14));
+}
+
 TEST(Rigid3, InverseUndoes) {
   const Rigid3 motion = SceneRandom(3).motion(3.0);
   EXPECT_THAT(motion * motion.inverse(), IsNearMotion(Rigid3(), 1e-14));
@@ -65,8 +82,9 @@ TEST(So3, ExpIsRodrigues) {
   const Eigen::Matrix3d expected = Eigen::AngleAxisd(w.norm(), w.normalized()).toRotationMatrix();
   EXPECT_THAT(so3_exp(w).toRotationMatrix(), IsNear(expected, 1e-14));
   // A turn about y (down) by a right angle takes forward to right.
-  EXPECT_THAT((so3_exp({0.0, 0.5 * std::numbers::pi, 0.0}) * Eigen::Vector3d::UnitZ()),
-              IsNear(Eigen::Vector3d(1.0, 0.0, 0.0), 1e-15));
+  const Eigen::Vector3d turned =
+      so3_exp({0.0, 0.5 * std::numbers::pi, 0.0}) * Eigen::Vector3d::UnitZ();
+  EXPECT_THAT(turned, IsNear(Eigen::Vector3d(1.0, 0.0, 0.0), 1e-15));
 }
 
 TEST(So3, LogIsTheInverseOfExp) {
@@ -78,15 +96,36 @@ TEST(So3, LogIsTheInverseOfExp) {
   // Beyond pi the shorter way round.
   const Eigen::Vector3d shorter = -(2.0 * std::numbers::pi - 4.0) * axis;
   EXPECT_THAT(so3_log(so3_exp(4.0 * axis)), IsNear(shorter, 1e-14));
-  EXPECT_NEAR(so3_log(so3_exp(std::numbers::pi * axis)).norm(), std::numbers::pi, 1e-14);
+  const Eigen::Vector3d half_turn = std::numbers::pi * axis;
+  EXPECT_NEAR(so3_log(so3_exp(half_turn)).norm(), std::numbers::pi, 1e-14);
+}
+
+TEST(Skew, IsTheCrossProduct) {
+  const Eigen::Vector3d a(1.0, 2.0, 3.0);
+  const Eigen::Vector3d b(-4.0, 0.5, 6.0);
+  EXPECT_THAT(skew(a) * b, IsNear(a.cross(b), 1e-15));
 }
 
 constexpr Camera kCamera{700.0, 710.0, 600.0, 180.0, 1241, 376};
 
 TEST(Camera, ProjectsAsItsMatrix) {
   const Eigen::Vector3d point(1.0, -0.5, 8.0);
-  EXPECT_THAT(kCamera.project(point), IsNear((kCamera.matrix() * point).hnormalized(), 1e-12));
+  const Eigen::Vector2d expected = (kCamera.matrix() * point).hnormalized();
+  EXPECT_THAT(kCamera.project(point), IsNear(expected, 1e-12));
   EXPECT_THAT(kCamera.project(point), IsNear(Eigen::Vector2d(687.5, 135.625), 1e-12));
+}
+
+TEST(Camera, NormalizeIsTheInverseOfProject) {
+  const Eigen::Vector2d uv(13.25, 300.5);
+  EXPECT_THAT(kCamera.project(7.0 * kCamera.normalize(uv).homogeneous()), IsNear(uv, 1e-12));
+  EXPECT_THAT(kCamera.normalize({600.0, 180.0}), IsNear(Eigen::Vector2d(0.0, 0.0), 0.0));
+}
+
+TEST(Camera, RightOfTheAxisIsRightInTheImageAndDownIsDown) {
+  const Eigen::Vector2d uv = kCamera.project({1.0, 1.0, 10.0});
+  EXPECT_GT(uv.x(), kCamera.cx_px);
+  EXPECT_GT(uv.y(), kCamera.cy_px);
+  EXPECT_DOUBLE_EQ(kCamera.mean_focal_px(), 705.0);
 }
 
 }  // namespace

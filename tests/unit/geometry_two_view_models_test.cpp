@@ -116,6 +116,21 @@ TEST(Scores, BrokenPointsAreOutliersAndNoPointsScoreZero) {
   EXPECT_EQ(score_fundamental(row_fundamental(), {{}, {}}, 1.0).score, 0.0);
 }
 
+TEST(Scores, MatchesThatDoNotPairAreOurMistake) {
+  const Points one = {{1.0, 2.0}};
+  EXPECT_THROW(static_cast<void>(score_homography(Eigen::Matrix3d::Identity(), {one, {}}, 1.0)),
+               std::logic_error);
+  EXPECT_THROW(static_cast<void>(score_fundamental(row_fundamental(), {{}, one}, 1.0)),
+               std::logic_error);
+}
+
+TEST(HomographyRatio, IsTheShareOfTheHomography) {
+  EXPECT_DOUBLE_EQ(homography_ratio(2.0, 3.0), 0.4);
+  EXPECT_EQ(homography_ratio(0.0, 0.0), 0.0);
+  EXPECT_EQ(homography_ratio(0.0, 5.0), 0.0);
+  EXPECT_EQ(homography_ratio(5.0, 0.0), 1.0);
+}
+
 struct PlantedPlane {
   Rigid3 cur_from_prev;  ///< |translation| == 1
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
@@ -181,6 +196,48 @@ TEST(DecomposeHomography, RefusesWhatDoesNotDecompose) {
   EXPECT_TRUE(decompose_homography(Eigen::Matrix3d::Identity(), camera).empty());
   // Rank 1.
   EXPECT_TRUE(decompose_homography(Eigen::Matrix3d::Ones(), camera).empty());
+}
+
+TEST(DecomposeHomography, SingularMatrixStaysFinite) {
+  // A plane through the centre of the current camera: rank 2.
+  PlantedPlane plane = planted_plane(5);
+  plane.distance = plane.normal.dot(plane.cur_from_prev.inverse().translation);
+  ASSERT_NEAR(euclidean_homography(plane).determinant(), 0.0, 1e-12);
+  for (const Rigid3& hypothesis : decompose_homography(pixel_homography(plane), kitti_camera())) {
+    EXPECT_THAT(hypothesis, IsFiniteMotion());
+  }
+}
+
+TEST(DecomposeEssential, FourDifferentMotions) {
+  const auto hypotheses = decompose_essential(essential_from_motion(SceneRandom(2).motion(0.5)));
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      EXPECT_GT(motion_error(hypotheses[i], hypotheses[j]), 0.1);
+    }
+  }
+}
+
+TEST(DecomposeEssential, BrokenMatrixGivesNoNan) {
+  const Eigen::Matrix3d zero = Eigen::Matrix3d::Zero();
+  const Eigen::Matrix3d ones = Eigen::Matrix3d::Ones();
+  for (const Eigen::Matrix3d& e : {zero, ones}) {
+    for (const Rigid3& hypothesis : decompose_essential(e)) {
+      EXPECT_THAT(hypothesis, IsFiniteMotion());
+    }
+  }
+}
+
+TEST(EssentialMatrix, HoldsForMatchesAndConvertsToPixelsAndBack) {
+  const Scene scene = make_scene({.num_points = 50, .seed = 4});
+  const Eigen::Matrix3d e = essential_from_motion(scene.cur_from_prev);
+  const Eigen::Matrix3d f = fundamental_from_essential(e, scene.camera);
+  EXPECT_THAT(essential_from_fundamental(f, scene.camera), IsNear(e, 1e-12));
+  ASSERT_EQ(scene.prev_uv.size(), 50U);
+  for (std::size_t i = 0; i < scene.prev_uv.size(); ++i) {
+    const Eigen::Vector3d line = f * scene.prev_uv[i].homogeneous();
+    const double distance_px = line.dot(scene.cur_uv[i].homogeneous()) / line.head<2>().norm();
+    EXPECT_NEAR(distance_px, 0.0, 1e-8);
+  }
 }
 
 }  // namespace

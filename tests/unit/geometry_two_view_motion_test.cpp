@@ -61,6 +61,21 @@ TEST(MotionFromEssential, NoiseAndOutliersDoNotChangeTheChoice) {
   }
 }
 
+TEST(MotionFrom, RunnerUpIsTheSecondBestInWhateverOrderTheyCome) {
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const Scene scene = make_scene({.noise_px = 0.5, .planar = true, .seed = seed});
+    std::vector<int> counts;
+    for (const Rigid3& hypothesis : decompose_homography(true_homography(scene), scene.camera)) {
+      counts.push_back(
+          test_points(hypothesis, {scene.prev_uv, scene.cur_uv}, scene.camera).num_good);
+    }
+    std::sort(counts.rbegin(), counts.rend());
+    const auto motion = homography_motion(scene).value();
+    EXPECT_EQ(motion.test.num_good, counts[0]);
+    EXPECT_DOUBLE_EQ(motion.runner_up_ratio, static_cast<double>(counts[1]) / counts[0]);
+  }
+}
+
 TEST(MotionFromHomography, AllPointsPassAndTheTrueMotionIsOneOfTheBest) {
   int num_true = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
@@ -94,6 +109,28 @@ TEST(MotionFromHomography, ADecisiveChoiceIsTheTrueMotion) {
   }
   // Most tilted planes leave two motions open.
   EXPECT_GE(num_decisive, 10);
+}
+
+TEST(MotionFrom, DegenerateModelsGiveNothing) {
+  const Scene scene = make_scene({.seed = 3});
+  const Eigen::Matrix3d k = scene.camera.matrix();
+  const Eigen::Matrix3d rotation_only = k * scene.cur_from_prev.rotation_matrix() * k.inverse();
+  const auto from_h = [&](const Eigen::Matrix3d& h) { return motion_from_homography(h, scene); };
+  EXPECT_FALSE(from_h(rotation_only).has_value());
+  EXPECT_FALSE(from_h(Eigen::Matrix3d::Zero()).has_value());
+  const Eigen::Matrix3d e = essential_from_motion(scene.cur_from_prev);
+  EXPECT_FALSE(motion_from_essential(e, {{}, {}}, scene.camera).has_value());
+}
+
+TEST(MotionFrom, EqualPointsAreNeverDecisive) {
+  const Scene scene = make_scene({.seed = 3});
+  const Points same(200, Eigen::Vector2d(300.0, 100.0));
+  const auto motion =
+      motion_from_essential(essential_from_motion(scene.cur_from_prev), {same, same}, scene.camera);
+  if (motion.has_value()) {
+    EXPECT_THAT(motion->cur_from_prev, IsFiniteMotion());
+    EXPECT_FALSE(is_decisive(*motion, 200));
+  }
 }
 
 TEST(IsDecisive, EveryCriterionCounts) {
@@ -226,6 +263,14 @@ TEST(Triangulate, PointBehindTheCamerasIsFoundThere) {
   const TriangulatedPoint point = triangulate(motion, image(behind), image(motion * behind));
   ASSERT_TRUE(point.finite);
   EXPECT_THAT(point.in_prev, IsNear(behind, 1e-10));
+}
+
+TEST(Triangulate, ScaleFollowsTheTranslation) {
+  const Eigen::Vector3d truth(1.0, 2.0, 10.0);
+  const Rigid3 motion(so3_exp({0.0, 0.05, 0.0}), {1.0, 0.1, 0.2});
+  const Rigid3 longer(motion.rotation, 3.0 * motion.translation);
+  EXPECT_THAT(triangulate(longer, image(truth), image(motion * truth)).in_prev,
+              IsNear(3.0 * truth, 1e-10));
 }
 
 TEST(Triangulate, NoisyMatchesGiveTheLeastReprojectionError) {

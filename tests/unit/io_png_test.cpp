@@ -223,7 +223,8 @@ TEST(PngFile, EveryOtherKindHasThePixelsOpenCvGives) {
   for (const Bytes& png : files) {
     for (const bool as_color : {false, true}) {
       const auto file = folder.file("a.png", std::string(png.begin(), png.end()));
-      EXPECT_TRUE(is_same(*read_image(file, as_color), by_opencv(png, as_color))) << png.size();
+      const Expected<cv::Mat> image = read_image(file, as_color);
+      EXPECT_TRUE(is_same(*image, by_opencv(png, as_color))) << png.size();
     }
   }
 }
@@ -239,6 +240,25 @@ TEST(PngFile, WhatIsEncodedHasThePixels) {
       EXPECT_TRUE(is_same(*decoded, image));
     }
   }
+}
+
+TEST(PngFile, ErrorsNameTheFile) {
+  const TempFolder folder;
+  const Bytes png = encoded(png_of(test_image(CV_8UC1), {4}));
+  const std::string sound(png.begin(), png.end());
+  std::string damaged = sound;
+  damaged[damaged.size() / 2] ^= 0x55;
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"", "found an empty file"},
+      {"GIF89a and more", "found another kind of file"},
+      {sound.substr(0, sound.size() - 13), "found one damaged or cut off"},
+      {damaged, "found one damaged or cut off"}};
+  for (const auto& [contents, wanted] : cases) {
+    const Expected<cv::Mat> image = read_image(folder.file("b.png", contents), false);
+    EXPECT_THAT(image.error().message, HasSubstr("b.png: expected"));
+    EXPECT_THAT(image.error().message, HasSubstr(wanted));
+  }
+  EXPECT_THAT(read_image(folder / "none.png", true).error().message, HasSubstr("cannot read: "));
 }
 
 /// The header is enough: the pixels are not decoded.

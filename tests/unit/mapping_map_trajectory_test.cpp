@@ -43,6 +43,14 @@ Rigid3 pose_of(const Similarity3& placed) { return {placed.rotation, placed.tran
 
 const Similarity3 kCorrection(1.2, so3_exp({0.05, -0.1, 0.02}), {3.0, -1.0, 2.0});
 
+TEST(MapTrajectory, IsTheWorldsWhereNothingIsKept) {
+  const Path path(3);
+  const auto placed = path.placed();
+  ASSERT_EQ(placed.size(), 3U);
+  EXPECT_THAT(pose_of(placed[2]), IsNearMotion(path.poses[2], 1e-14));
+  EXPECT_EQ(placed[2].scale, 1.0);
+}
+
 TEST(MapTrajectory, MovesAllFramesAsOneCorrectionDoes) {
   Path path(40);
   for (const int frame : {5, 12, 30}) {
@@ -103,9 +111,11 @@ TEST(MapTrajectory, LeavesKeyframesOfAnotherRecordingAlone) {
   Path path(20);
   path.keep(0, {50.0, Eigen::Quaterniond::Identity(), {7.0, 8.0, 9.0}});
   path.map.keyframes[0].frame = -4;
-  EXPECT_THAT(pose_of(path.placed()[9]), IsNearMotion(path.poses[9], 1e-12));
+  const auto alone = path.placed();
+  EXPECT_THAT(pose_of(alone[9]), IsNearMotion(path.poses[9], 1e-12));
   path.keep(10, kCorrection);
-  EXPECT_THAT(pose_of(path.placed()[9]), IsNearMotion(kCorrection * path.poses[9], 1e-10));
+  const auto placed = path.placed();
+  EXPECT_THAT(pose_of(placed[9]), IsNearMotion(kCorrection * path.poses[9], 1e-10));
 }
 
 }  // namespace

@@ -178,5 +178,10 @@ TEST(PoseGraph, IsTheSameTwiceAndSoonDone) {
   EXPECT_LE(took.count(), 20.0);  // 1 s on a free core
 }
 
+TEST(PoseGraph, WithoutLoopsAndLengthsNothingMoves) {
+  Circle circle(20, 20, 7);
+  EXPECT_FALSE(solve_pose_graph(circle.map));
+}
+
 }  // namespace
 }  // namespace stemvo

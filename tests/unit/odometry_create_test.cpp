@@ -134,6 +134,12 @@ TEST(OdometryCreate, AModelThatCannotTakeTheFramesIsAnErrorBeforeWork) {
               AllOf(HasSubstr("fixed_k4s4.onnx"), HasSubstr("found 1241x376")));
 }
 
+TEST(OdometryCreate, AFrameSmallerThanTheKernelIsAnError) {
+  Options options;
+  options.stem.tracking_resolution = TrackingResolution::kHalf;
+  EXPECT_THAT(error_of(options, {200, 200, 0.5, 0.5, 1, 1}), HasSubstr("found 1x1"));
+}
+
 TEST(OdometryProcess, AnImageOfAnotherSizeOrTypeIsAnErrorAndChangesNothing) {
   Odometry odometry = Odometry::create(kCamera).value();
   const auto message = [&](const cv::Mat& image, PixelOrder order) {

@@ -75,6 +75,16 @@ TEST(Localization, TooFewOrContradictingLandmarksGiveNoPose) {
   EXPECT_FALSE(localize({}, Rigid3(), few.camera, {}).has_value());
 }
 
+TEST(Localization, SeesTheLandmarksThatTheFrameTracks) {
+  Window window;
+  window.landmarks = {{2, {0.0, 0.0, 2.0}}, {5, {0.0, 0.0, 5.0}}, {9, {0.0, 0.0, 9.0}}};
+  const Observations points{{1, {1.0, 0.0}}, {5, {5.0, 0.0}}, {7, {7.0, 0.0}}, {9, {9.0, 0.0}}};
+  const SeenLandmarks seen = find_seen_landmarks(window, points);
+  ASSERT_EQ(seen.size(), 2);
+  EXPECT_EQ(seen.points[0].z(), 5.0);
+  EXPECT_EQ(seen.uv[1].x(), 9.0);
+}
+
 TEST(Localization, LostLandmarksAreThoseInFrontThatTheFrameDoesNotTrack) {
   const Camera camera{100.0, 100.0, 50.0, 40.0, 100, 80};
   Window window;
@@ -174,6 +184,17 @@ TEST(RobustPose, FindsThePoseWithoutAGuessAmongWrongMatchesAndTheSameBitsAgain) 
     EXPECT_EQ(again->translation, pose->translation);
     EXPECT_EQ(again->rotation.coeffs(), pose->rotation.coeffs());
   }
+}
+
+TEST(RobustPose, TooLittleOrDegenerateInputIsNoCrash) {
+  const Scene scene = make_scene({});
+  const std::vector<Eigen::Vector3d> few(5, Eigen::Vector3d(1.0, 2.0, 9.0));
+  const std::vector<Eigen::Vector2d> few_uv(5, Eigen::Vector2d(100.0, 80.0));
+  EXPECT_FALSE(estimate_absolute_pose(few, few_uv, scene.camera, 2.0, 1).has_value());
+  const std::vector<Eigen::Vector3d> same(50, Eigen::Vector3d(1.0, 2.0, 9.0));
+  const std::vector<Eigen::Vector2d> same_uv(50, Eigen::Vector2d(100.0, 80.0));
+  const auto pose = estimate_absolute_pose(same, same_uv, scene.camera, 2.0, 1);
+  EXPECT_TRUE(!pose.has_value() || pose->matrix().allFinite());
 }
 
 }  // namespace

@@ -43,6 +43,13 @@ Chain make_chain(const OdometryOptions& options = {}, double step_m = 1.0) {
   return {options, scale};
 }
 
+TEST(MotionChain, ForwardDriveGoesForwardByConstantSteps) {
+  Chain chain = make_chain({}, 0.7);
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kInitializing);
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kTracking);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.4, 1e-12);
+}
+
 TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
   OdometryOptions paper{.composition = Composition::kPaper};
   Chain right = make_chain();
@@ -60,6 +67,14 @@ TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
   EXPECT_LT((right.world_from_camera().translation - truth.translation).norm(), 1e-9);
   EXPECT_LT(right.world_from_camera().rotation.angularDistance(truth.rotation), 1e-9);
   EXPECT_GT((wrong.world_from_camera().translation - truth.translation).norm(), 0.1);
+}
+
+TEST(MotionChain, WithoutAScaleAStepIsOneUnitWhateverTheMetresAre) {
+  ScaleOptions scale{.source = ScaleSource::kNone, .step_m = 0.7};
+  Chain chain({}, scale);
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
 }
 
 TEST(MotionChain, InitializesUntilAMotionIsDecisive) {

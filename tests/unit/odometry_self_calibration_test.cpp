@@ -165,6 +165,13 @@ TEST_F(SelfCalibrationTest, FindsALensThatNobodyKnewOf) {
   EXPECT_TRUE(other.radial().isZero()) << "another camera";
 }
 
+TEST(RadialLens, UndistortsWhatItDistorts) {
+  const RadialLens lens = radial_lens(kitti_camera(), {0.03, -0.01});
+  const Eigen::Vector2d corner(0.0, 0.0);
+  EXPECT_GT((lens.distort(corner) - corner).norm(), 5.0);
+  EXPECT_LT((lens.undistort(lens.distort(corner)) - corner).norm(), 1e-3);
+}
+
 /// However sure its runs are: as much is missed where all turns are to one side.
 TEST_F(SelfCalibrationTest, ACameraThatIsHalfAPixelOffIsKept) {
   given_.cx_px += 0.5;

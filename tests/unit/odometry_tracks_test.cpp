@@ -16,6 +16,16 @@ Matches make_matches() {
   return matches;
 }
 
+TEST(Observations, AreOrderedAndWithoutWhatIsNotKept) {
+  const Observations points = current_points(make_matches(), {1, 1, 0, 1});
+  ASSERT_EQ(points.size(), 3U);
+  EXPECT_EQ(points[0].track_id, 2);
+  EXPECT_EQ(points[1].track_id, 4);
+  EXPECT_EQ(points[2].track_id, 7);
+  EXPECT_EQ(points[2].uv, Eigen::Vector2d(7.0, 1.0));
+  EXPECT_EQ(previous_points(make_matches(), {1, 1, 0, 1})[2].uv, Eigen::Vector2d(7.0, 0.0));
+}
+
 TEST(Observations, BegunOnesAreAddedWhereTheyStartAndOthersStayWhereTheyAre) {
   Observations points{{2, {-1.0, -1.0}}, {5, {-2.0, -2.0}}};
   add_begun_points(make_matches(), {1, 1, 1, 0}, points);
@@ -28,6 +38,18 @@ TEST(Observations, BegunOnesAreAddedWhereTheyStartAndOthersStayWhereTheyAre) {
   for (std::size_t i = 1; i < points.size(); ++i) {
     EXPECT_LT(points[i - 1].track_id, points[i].track_id);
   }
+}
+
+TEST(Observations, PairsAreOfTracksThatBothFramesSee) {
+  const Observations prev{{1, {1.0, 1.0}}, {4, {4.0, 4.0}}, {6, {6.0, 6.0}}};
+  const Observations cur{{0, {0.0, 9.0}}, {4, {5.0, 4.0}}, {6, {7.0, 6.0}}, {8, {8.0, 9.0}}};
+  const PointPairs pairs = common_points(prev, cur);
+  ASSERT_EQ(pairs.size(), 2);
+  EXPECT_EQ(pairs.track_ids[0], 4);
+  EXPECT_EQ(pairs.prev_uv[1], Eigen::Vector2d(6.0, 6.0));
+  EXPECT_EQ(pairs.cur_uv[1], Eigen::Vector2d(7.0, 6.0));
+  EXPECT_EQ(common_points(prev, {}).size(), 0);
+  EXPECT_EQ(common_points({}, cur).size(), 0);
 }
 
 TEST(Parallax, IsWhatARotationLeavesOfTheFlow) {

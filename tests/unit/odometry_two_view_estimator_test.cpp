@@ -71,7 +71,8 @@ TEST(TwoViewEstimator, ThePublicFunctionSaysWhatIsWrongWithItsInput) {
   Options options;
   options.two_view.sigma_px = -1.0;
   EXPECT_FALSE(estimate_two_view(scene.prev_uv, scene.cur_uv, scene.camera, options));
-  EXPECT_EQ(estimate_two_view({}, {}, scene.camera).value().state, FrameState::kLost);
+  const auto none = estimate_two_view({}, {}, scene.camera).value();
+  EXPECT_EQ(none.state, FrameState::kLost);
 }
 
 TEST(TwoViewEstimator, NoiseAndOutliersOver50Seeds) {
@@ -143,7 +144,8 @@ TEST(TwoViewEstimator, TooFewOrRandomMatchesAreLostNotWrong) {
             FrameState::kLost);
   EXPECT_EQ(estimator.measure({{}, {}}, scene.camera, true).state, FrameState::kLost);
 
-  EXPECT_TRUE(measure(drive_scene({}, 0.0, 1.0, 9)).cur_from_prev.translation.allFinite());
+  const MeasuredMotion random = measure(drive_scene({}, 0.0, 1.0, 9));
+  EXPECT_TRUE(random.cur_from_prev.translation.allFinite());
 
   const std::vector<Eigen::Vector2d> same(100, Eigen::Vector2d(10.0, 20.0));
   const std::vector<Eigen::Vector2d> moved(100, Eigen::Vector2d(15.0, 20.0));

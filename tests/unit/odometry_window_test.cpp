@@ -117,6 +117,14 @@ TEST(BundleAdjustment, ALandmarkBehindAKeyframeDoesNotStopTheRest) {
   EXPECT_EQ(window.landmarks.at(behind).z(), -5.0);
 }
 
+TEST(BundleAdjustment, TooSmallAWindowIsLeftAlone) {
+  const DriveTracks drive(2, 0.0, 4);
+  Window window = window_of(drive, {});
+  EXPECT_FALSE(refine_window(window, drive.camera, {}));
+  Window empty;
+  EXPECT_FALSE(refine_window(empty, drive.camera, {}));
+}
+
 TEST(Window, KnownLandmarksAreFixedWhereTheyAreSeenAndNoAdjustmentMovesThem) {
   const DriveTracks drive(6, 0.3, 4);
   Window window = window_of(drive, {});

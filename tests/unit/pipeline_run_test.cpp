@@ -78,7 +78,8 @@ TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
   EXPECT_NEAR(std::sqrt(sum), summary->report.metrics->ate_rmse.sim3_m, 1e-4);
   EXPECT_FALSE(summary->interrupted);
   EXPECT_TRUE(summary->warnings.empty());
-  EXPECT_EQ(read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt")->size(), 6U);
+  const auto poses = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
+  EXPECT_EQ(poses->size(), 6U);
   for (const char* name :
        {"trajectory_tum.txt", "trajectory_map_tum.txt", "map.ply", "frames.csv", "config.yaml",
         "metrics.json", "trajectory.png", "pictures/000000.png", "pictures/000004.png"}) {
@@ -107,7 +108,8 @@ TEST_F(PipelineRun, GroundTruthScaleRescalesStepsAndNothingElse) {
 }
 
 TEST_F(PipelineRun, TimingIsThereWhereItIsAskedForAndChangesNothingElse) {
-  EXPECT_FALSE(run_sequence(request_)->report.timing.has_value());
+  const auto plain = run_sequence(request_);
+  EXPECT_FALSE(plain->report.timing.has_value());
   const std::string poses = read_all(request_.out_dir / "trajectory_kitti.txt");
   auto keys = nlohmann::ordered_json::parse(read_all(request_.out_dir / "metrics.json"));
   EXPECT_FALSE(keys.contains("timing"));
@@ -260,7 +262,8 @@ TEST_F(PipelineRun, AMapIsSavedAndTakenUpAgain) {
   EXPECT_EQ(read_kitti_trajectory(request_.out_dir / "trajectory_map_kitti.txt")->size(),
             std::size_t{kNumFrames});
   request_.map = request_.saved_map;
-  EXPECT_GT(run_sequence(request_)->report.map->num_keyframes, first->report.map->num_keyframes);
+  const auto second = run_sequence(request_);
+  EXPECT_GT(second->report.map->num_keyframes, first->report.map->num_keyframes);
   request_.config.stem.model = "log";
   EXPECT_THAT(error_of(request_), HasSubstr("saved.map: expected a map of channel 'log"));
   request_.map.reset();
@@ -291,6 +294,23 @@ TEST_F(PipelineRun, StoppedEarlyHoldsWhatWasComputed) {
   EXPECT_EQ(summary->report.first_frame, 1U);
   EXPECT_EQ(read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt")->size(), 3U);
   EXPECT_NEAR(summary->report.metrics->path_length_m, 2 * kStep_m, 1e-6);
+}
+
+TEST_F(PipelineRun, StoppingAfterTheLastFrameIsNoInterrupt) {
+  const auto summary =
+      run_sequence(request_, [](std::size_t done, std::size_t total) { return done < total; });
+  ASSERT_TRUE(summary);
+  EXPECT_FALSE(summary->interrupted);
+}
+
+TEST_F(PipelineRun, BrokenFrameIsAWarningWithItsFile) {
+  request_.config.scale_choice = ScaleChoice::kOptions;
+  fs::resize_file(request_.sequence_dir / "image_0/000003.png", 200);
+  const auto summary = run_sequence(request_);
+  EXPECT_THAT(summary->warnings, ElementsAre(HasSubstr("000003.png")));
+  EXPECT_EQ(summary->report.num_frames, 6U);
+  EXPECT_LT(summary->report.tracked_fraction, 1.0);
+  EXPECT_THAT(read_all(request_.out_dir / "frames.csv"), HasSubstr(",no_image,"));
 }
 
 TEST_F(PipelineRun, IsScoredFromWhereTheCameraStarts) {

@@ -127,8 +127,9 @@ TEST(EvaluateFiles, FilesWithTimesAreMatchedByTime) {
   EXPECT_EQ(report->rows[0].num_poses, 151U);
   EXPECT_LT(report->rows[0].metrics.ate_rmse.none_m, 1e-6);
   EXPECT_THAT(format_evaluation_table(*report),
-              AllOf(HasSubstr("estimate_tum.txt: 1 of 151 poses have no true pose of their time\n"),
-                    HasSubstr("a pose for 150 of 300 true ones: steps are those between them\n")));
+              HasSubstr("estimate_tum.txt: 1 of 151 poses have no true pose of their time\n"));
+  EXPECT_THAT(format_evaluation_table(*report),
+              HasSubstr("a pose for 150 of 300 true ones: steps are those between them\n"));
   request.tolerance_s = 0.003;
   const auto none = evaluate_files(request);
   EXPECT_THAT(none.error().message, HasSubstr("at least 2 poses within 0.003 s"));
@@ -203,9 +204,10 @@ TEST(EvaluateFiles, TableAndJsonSayTheSame) {
   const auto report = evaluate_files({files.truth, {files.kitti}, Alignment::kScale});
   ASSERT_TRUE(report);
   const std::string table = format_evaluation_table(*report);
-  EXPECT_THAT(table, AllOf(::testing::ContainsRegex("alignment +scale"),
-                           ::testing::ContainsRegex("estimate.txt +0\\.00 "),
-                           HasSubstr("(zero motion)"), HasSubstr("segments of 100..800 m")));
+  EXPECT_THAT(table, ::testing::ContainsRegex("alignment +scale"));
+  EXPECT_THAT(table, ::testing::ContainsRegex("estimate.txt +0\\.00 "));
+  EXPECT_THAT(table, HasSubstr("(zero motion)"));
+  EXPECT_THAT(table, HasSubstr("segments of 100..800 m"));
 
   const auto json = evaluation_document(*report);
   EXPECT_EQ(json["alignment"], "scale");
@@ -216,6 +218,15 @@ TEST(EvaluateFiles, TableAndJsonSayTheSame) {
             report->rows[0].metrics.t_rel_percent.value());
   EXPECT_EQ(json["zero_motion"]["average_offset_m"].get<double>(),
             report->zero_motion.metrics.null_offset_m);
+}
+
+TEST(ParseAlignment, KnowsItsFourWords) {
+  for (const std::string word : {"none", "scale", "se3", "sim3"}) {
+    ASSERT_TRUE(parse_alignment(word)) << word;
+    EXPECT_EQ(to_string(*parse_alignment(word)), word);
+  }
+  EXPECT_THAT(message_of(parse_alignment("7dof")),
+              HasSubstr("expected none, scale, se3 or sim3, found '7dof'"));
 }
 
 }  // namespace

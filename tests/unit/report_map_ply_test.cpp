@@ -49,5 +49,13 @@ TEST(MapPly, LeavesOutWhatIsNoNumber) {
   EXPECT_EQ(file.edges.size(), 2U);
 }
 
+TEST(MapPly, EmptyIsAFileTooAndAWrongFolderIsAnError) {
+  const TempFolder folder;
+  ASSERT_TRUE(write_map_ply(folder / "map.ply", {}, {}));
+  EXPECT_TRUE(read_ply(folder / "map.ply").vertices.empty());
+  EXPECT_THAT(message_of(write_map_ply("/nonexistent/map.ply", {}, {})),
+              HasSubstr("/nonexistent/map.ply: cannot write"));
+}
+
 }  // namespace
 }  // namespace stemvo

@@ -148,7 +148,8 @@ TEST(ContrastNormalization, HalfOfAFineChannelIsABinomialOfFourByFour) {
                       .contrast_high_percent = 100.0};
   const ChannelImage half = ContrastNormalization(options).apply(channel);
   ASSERT_EQ(half.pixels.size(), cv::Size(25, 18));
-  EXPECT_EQ(half.map.to_input({7.0, 3.0}), Eigen::Vector2d(14.5, 6.5));
+  const Eigen::Vector2d centre = half.map.to_input({7.0, 3.0});
+  EXPECT_EQ(centre, Eigen::Vector2d(14.5, 6.5));
   const cv::Mat weights = (cv::Mat_<float>(4, 1) << 0.125F, 0.375F, 0.375F, 0.125F);
   const double smooth = cv::Mat(weights * weights.t()).dot(channel.values({13, 5, 4, 4}));
   EXPECT_NEAR(half.pixels.at<unsigned char>(3, 7), smooth, 1.5);

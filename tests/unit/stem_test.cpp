@@ -145,8 +145,25 @@ TEST(Stem, InputLayerAndGray) {
   EXPECT_EQ(gray->apply(cv::Mat1b(2, 2, 7))->values.at<float>(0, 0), 7.0F);
 }
 
+TEST(Stem, InfoNamesTheModel) {
+  const Stem stem = make_stem(kNorm4, 2);
+  EXPECT_EQ(stem.info().model, tiny_model("norm_k4s4"));
+  EXPECT_EQ(stem.info().layer, "stem");
+  EXPECT_EQ(stem.info().filter, 1);
+  EXPECT_EQ(stem.info().num_filters, 6);
+  EXPECT_EQ(stem.info().sampling_px, 2);
+}
+
 std::string error_of(const std::string& model, int filter = -1, int sampling = 0) {
   return message_of(Stem::load_all({.model = model, .filter = filter, .sampling_px = sampling}));
+}
+
+TEST(StemErrors, NamesAndPaths) {
+  EXPECT_EQ(error_of(tiny_model("plain_k4s4")), "no error");
+  EXPECT_EQ(error_of("other"),
+            "stem.model: expected default, paper, gray, input_layer, log, census or the path of an "
+            ".onnx, found 'other'");
+  EXPECT_THAT(error_of("/no/such.onnx"), HasSubstr("/no/such.onnx: cannot read: No such file"));
 }
 
 TEST(StemErrors, FilterAndSamplingNameTheAllowedValues) {

@@ -38,7 +38,8 @@ class SyntheticDriveTest : public ::testing::Test {
 TEST_F(SyntheticDriveTest, ShorterDriveReplacesALongerOne) {
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(4)));
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(2)));
-  EXPECT_EQ(open_kitti(root_ / "out" / "sequences" / "00")->size(), 2U);
+  const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
+  EXPECT_EQ(sequence->size(), 2U);
 }
 
 TEST_F(SyntheticDriveTest, IsASequenceWithExactTruth) {

@@ -21,6 +21,13 @@ double light_of(double value) {
   return low;
 }
 
+TEST(SmallChip, ResponseRisesAndCompressesHighlights) {
+  EXPECT_EQ(chip::response(0.0F), 0.0F);
+  EXPECT_NEAR(chip::response(1.0F), 1.0F, 1e-6F);
+  EXPECT_GT(chip::response(0.1F) - chip::response(0.0F),
+            2.0F * (chip::response(1.0F) - chip::response(0.9F)));
+}
+
 /// Even light: the deviation in electrons is that of photons and of reading, at any gain.
 TEST(SmallChip, NoiseIsThatOfPhotonsAndReading) {
   for (const float exposure : {0.5F, 1.0F, 2.0F}) {
@@ -76,6 +83,27 @@ TEST(SmallChip, SpreadsPoints) {
     second += share * static_cast<double>(i * i);
   }
   EXPECT_NEAR(std::sqrt(second - first * first), chip::kSpread_px, 0.12);
+}
+
+/// A smaller part of each pixel sees finer texture.
+TEST(SmallChip, GapsBetweenPixelsLeaveMoreContrast) {
+  const Drive drive = make_own_drive(3, 3);
+  const Camera camera = kitti_camera(0.25);
+  const Textures textures(3);
+  Scene scene(drive.world_from_camera[1].translation, {0.0, -0.8, 0.6}, 0.4);
+  add_street(drive.road, drive.arcs_m[1], 1, scene);
+  std::vector<const Face*> faces;
+  for (const Face& face : scene.faces()) {
+    faces.push_back(&face);
+  }
+  const Rigid3 pose(drive.world_from_camera[1].rotation, Vec3::Zero());
+  const auto fine_contrast = [&](double fill) {
+    const RenderedFrame frame = paint(faces, pose, camera, textures, {0, camera.height_px}, fill);
+    cv::Mat coarse;
+    cv::GaussianBlur(frame.rgb, coarse, {}, 1.0);
+    return cv::norm(frame.rgb - coarse, cv::NORM_L2);
+  };
+  EXPECT_GT(fine_contrast(0.8), 1.03 * fine_contrast(1.0));
 }
 
 constexpr double kRate_hz = 30.0;

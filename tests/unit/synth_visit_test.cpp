@@ -82,6 +82,16 @@ TEST(Visit, DriveThatComesBackSeesTheSameStreet) {
   }
 }
 
+TEST(Visit, DriveWithoutComingBackKeepsItsPoses) {
+  Trajectory given = round_a_block();
+  given.resize(350);
+  const Drive drive = make_drive_along(given);
+  ASSERT_EQ(drive.road.parts().size(), 1U);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    ASSERT_EQ(drive.world_from_camera[i].translation, given[i].translation);
+  }
+}
+
 TEST(Visit, SameStreetOnAnotherPath) {
   for (const int visit : {1, 2, 3}) {
     const Drive first = make_own_drive(120, 4);
@@ -101,6 +111,20 @@ TEST(Visit, SameStreetOnAnotherPath) {
       EXPECT_GT(nearest_m, 0.02) << "visit " << visit << ", frame " << i;
     }
   }
+}
+
+TEST(Visit, SameCourtyardOnAnotherWay) {
+  const Walk first = make_walk(600, 4, {.walk_rate_hz = 30.0});
+  const Walk again = make_walk(600, 4, {.visit = 1});
+  EXPECT_EQ(first.courtyard.x_m, again.courtyard.x_m);
+  EXPECT_EQ(first.courtyard.wall_m, again.courtyard.wall_m);
+  double most_m = 0.0;
+  for (std::size_t i = 0; i < 600; ++i) {
+    most_m = std::max(
+        most_m,
+        (first.world_from_camera[i].translation - again.world_from_camera[i].translation).norm());
+  }
+  EXPECT_GT(most_m, 1.0);
 }
 
 /// Texture: the image without its shades over 8 px and more.
