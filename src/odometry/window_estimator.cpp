@@ -101,14 +101,12 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   for (const auto& turn : {frame.hints.prev_from_cur, image_turn}) {
     start = turn ? nearer_pose(start, predict(turn), seen, camera()) : start;
   }
-  std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
+  const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
   if (found.has_value()) {
-    const auto of_world =
-        localize_without_thing(frame, found->world_from_camera, localized.inlier_mask);
-    found = of_world.has_value() ? of_world : found;
-  }
-  if (found.has_value()) {
-    return accept_localization(frame, found->world_from_camera, is_still, localized);
+    const Localization of_world =
+        localize_without_thing(frame, found->world_from_camera, localized.inlier_mask)
+            .value_or(*found);
+    return accept_localization(frame, of_world.world_from_camera, is_still, localized);
   }
   if (is_still) {  // few landmarks, but nothing moves
     return FrameState::kStationary;

@@ -45,8 +45,11 @@ std::optional<Localization> WindowEstimator::localize_without_thing(const Frame&
                                                                     std::vector<char>& mask) {
   const Matches& matches = frame.matches;
   const Rigid3 cur_from_last = found.inverse() * last_.world_from_camera;
-  if (!is_last_localized_ || matches.prev_frame != last_.frame ||
-      share_that_fits(cur_from_last, matches, mask) > kMinFitting) {
+  if (!is_last_localized_ || matches.prev_frame != last_.frame) {
+    return std::nullopt;
+  }
+  const double fitting = share_that_fits(cur_from_last, matches, mask);
+  if (fitting > kMinFitting) {
     return std::nullopt;
   }
   const MeasuredMotion motion =
@@ -61,11 +64,9 @@ std::optional<Localization> WindowEstimator::localize_without_thing(const Frame&
     return share_that_fits(motion.cur_from_prev, matches, party);
   };
   const double turn_px = camera().mean_focal_px() * motion.cur_from_prev.angle_rad();
-  const double size =
-      cell_votes(matches.cur_uv, thing) / std::max(cell_votes(matches.cur_uv, mask), 1.0);
+  const double size = cell_votes(matches.cur_uv, thing) / cell_votes(matches.cur_uv, mask);
   if (turn_px < kMinTurn_px || size < kMinThing || fits(thing) > kMaxOfThing ||
-      fits(rest) < kMinOfRest ||
-      fits(mask) < kMinGain * share_that_fits(cur_from_last, matches, mask)) {
+      fits(rest) < kMinOfRest || fits(mask) < kMinGain * fitting) {
     return std::nullopt;
   }
   const auto world =
