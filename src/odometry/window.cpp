@@ -57,6 +57,32 @@ std::optional<Eigen::Vector3d> triangulate_track(const Window& window,
              : std::nullopt;
 }
 
+/// By fewer landmarks a way is not judged.
+constexpr std::size_t kMinKnown = 8;
+
+/// For each keyframe whether its way to the newest one is known: the landmarks see it (median)
+/// under a larger angle than this. While the camera stands, the least error of its position would
+/// make near landmarks of what passes, and these the world's scale.
+std::vector<char> have_known_way(const Window& window, double min_way_rad) {
+  const Keyframe& newest = window.keyframes.back();
+  std::vector<Eigen::Vector3d> known;
+  for (const Observation& point : newest.points) {
+    const auto landmark = window.landmarks.find(point.track_id);
+    if (landmark != window.landmarks.end()) {
+      known.push_back(landmark->second);
+    }
+  }
+  std::vector<char> have_way;
+  for (const Keyframe& keyframe : window.keyframes) {
+    std::vector<double> parallaxes;
+    std::ranges::transform(known, std::back_inserter(parallaxes), [&](const auto& point) {
+      return parallax_rad(point, keyframe.world_from_camera, newest.world_from_camera);
+    });
+    have_way.push_back(known.size() < kMinKnown || median(std::move(parallaxes)) > min_way_rad);
+  }
+  return have_way;
+}
+
 /// Nearer, or behind: no start for the solver; map units.
 constexpr double kMinDepth = 1e-6;
 /// Fewer observations of a landmark hold it nowhere.
@@ -214,13 +240,16 @@ void triangulate_landmarks(Window& window, const Camera& camera, const WindowOpt
     return;
   }
   const std::vector<Rigid3> poses = poses_of(window);
+  const std::vector<char> have_way =
+      have_known_way(window, options.min_way_deg * std::numbers::pi / 180.0);
   ObservationWalk walk(window);
   for (const Observation& point : window.keyframes.back().points) {
-    if (window.landmarks.contains(point.track_id)) {
+    const std::span<const KeyframeObservation> seen = walk.seek(point.track_id);
+    if (window.landmarks.contains(point.track_id) || seen.empty() ||
+        have_way[seen.front().keyframe] == 0) {
       continue;
     }
-    if (const auto landmark =
-            triangulate_track(window, walk.seek(point.track_id), poses, camera, options)) {
+    if (const auto landmark = triangulate_track(window, seen, poses, camera, options)) {
       window.landmarks.emplace(point.track_id, *landmark);
     }
   }

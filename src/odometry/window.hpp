@@ -38,6 +38,7 @@ struct WindowOptions {
   /// Parallax of a new landmark between its first and last keyframe: only the direction of distant
   /// ones is known, but that holds the rotation.
   double min_parallax_deg = 0.1;
+  double min_way_deg = 0.25;  ///< of the known landmarks (median) between the same two keyframes
   double max_reprojection_error_px = 4.0;  ///< of a landmark in any keyframe
 };
 

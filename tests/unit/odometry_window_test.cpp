@@ -74,6 +74,30 @@ TEST(Window, TheWindowForgetsOldKeyframesAndTheirLandmarks) {
   }
 }
 
+/// What passes before a camera that stands: by a wrong step of 2 mm it were half a metre away.
+TEST(Landmarks, WhatPassesWhileTheCameraStandsIsNone) {
+  constexpr int kFirstPassing = 100000;
+  const DriveTracks drive(6, 0.0, 2);
+  Window window = window_of(drive, {});
+  const std::size_t num_landmarks = window.landmarks.size();
+  Keyframe& before = window.keyframes.back();
+  Keyframe standing{6, before.world_from_camera, before.points};
+  standing.world_from_camera.translation.x() += 0.002;
+  for (int i = 0; i < 40; ++i) {
+    const Eigen::Vector3d point =
+        before.world_from_camera * Eigen::Vector3d(-0.2 + 0.01 * i, 0.05, 0.5);
+    for (Keyframe* keyframe : {&before, &standing}) {
+      keyframe->points.push_back(
+          {kFirstPassing + i, drive.camera.project(keyframe->world_from_camera.inverse() * point)});
+    }
+  }
+  add_keyframe(window, standing, {});
+  triangulate_landmarks(window, drive.camera, {});
+  EXPECT_EQ(window.landmarks.size(), num_landmarks);
+  triangulate_landmarks(window, drive.camera, {.min_way_deg = 0.0});
+  EXPECT_EQ(window.landmarks.size(), num_landmarks + 40);  // they are as like landmarks as can be
+}
+
 TEST(Landmarks, WrongPlacesAreCulled) {
   const WindowOptions options;
   const DriveTracks drive(6, 0.0, 2);
