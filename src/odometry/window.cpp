@@ -14,6 +14,7 @@
 
 #include "geometry/median.hpp"
 #include "geometry/triangulation.hpp"
+#include "odometry/localization.hpp"
 
 namespace stemvo {
 namespace {
@@ -58,24 +59,18 @@ std::optional<Eigen::Vector3d> triangulate_track(const Window& window,
 }
 
 /// By fewer landmarks a way is not judged.
-constexpr std::size_t kMinKnown = 8;
+constexpr int kMinKnown = 8;
 
 /// For each keyframe whether its way to the newest one is known: the landmarks see it (median)
 /// under a larger angle than this. While the camera stands, the least error of its position would
 /// make near landmarks of what passes, and these the world's scale.
 std::vector<char> have_known_way(const Window& window, double min_way_rad) {
   const Keyframe& newest = window.keyframes.back();
-  std::vector<Eigen::Vector3d> known;
-  for (const Observation& point : newest.points) {
-    const auto landmark = window.landmarks.find(point.track_id);
-    if (landmark != window.landmarks.end()) {
-      known.push_back(landmark->second);
-    }
-  }
+  const SeenLandmarks known = find_seen_landmarks(window, newest.points);
   std::vector<char> have_way;
   for (const Keyframe& keyframe : window.keyframes) {
     std::vector<double> parallaxes;
-    std::ranges::transform(known, std::back_inserter(parallaxes), [&](const auto& point) {
+    std::ranges::transform(known.points, std::back_inserter(parallaxes), [&](const auto& point) {
       return parallax_rad(point, keyframe.world_from_camera, newest.world_from_camera);
     });
     have_way.push_back(known.size() < kMinKnown || median(std::move(parallaxes)) > min_way_rad);
@@ -244,9 +239,11 @@ void triangulate_landmarks(Window& window, const Camera& camera, const WindowOpt
       have_known_way(window, options.min_way_deg * std::numbers::pi / 180.0);
   ObservationWalk walk(window);
   for (const Observation& point : window.keyframes.back().points) {
+    if (window.landmarks.contains(point.track_id)) {
+      continue;
+    }
     const std::span<const KeyframeObservation> seen = walk.seek(point.track_id);
-    if (window.landmarks.contains(point.track_id) || seen.empty() ||
-        have_way[seen.front().keyframe] == 0) {
+    if (have_way[seen.front().keyframe] == 0) {
       continue;
     }
     if (const auto landmark = triangulate_track(window, seen, poses, camera, options)) {
