@@ -160,7 +160,8 @@ class TrafficPlan {
 
   [[nodiscard]] double camera_speed_m_s(double time_s) const {
     constexpr double kSpan_s = 0.5;
-    return (camera_arc_m(time_s + kSpan_s) - camera_arc_m(time_s - kSpan_s)) / (2.0 * kSpan_s);
+    const double from_s = std::max(0.0, time_s - kSpan_s);
+    return (camera_arc_m(time_s + kSpan_s) - camera_arc_m(from_s)) / (time_s + kSpan_s - from_s);
   }
 
   [[nodiscard]] double lead_arc_m(const Lead& lead, double time_s) const {
