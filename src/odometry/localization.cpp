@@ -94,24 +94,26 @@ Observations project_lost_landmarks(const Window& window,
   return lost;
 }
 
+std::vector<double> distances_px(const SeenLandmarks& seen,
+                                 const Rigid3& world_from_camera,
+                                 const Camera& camera) {
+  const Rigid3 camera_from_world = world_from_camera.inverse();
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < seen.points.size(); ++i) {
+    const Eigen::Vector3d point = camera_from_world * seen.points[i];
+    distances.push_back(point.z() > 0.0 ? (camera.project(point) - seen.uv[i]).norm()
+                                        : std::numeric_limits<double>::infinity());
+  }
+  return distances;
+}
+
 Rigid3 nearer_pose(const Rigid3& first,
                    const Rigid3& second,
                    const SeenLandmarks& seen,
                    const Camera& camera) {
-  if (seen.points.empty()) {
-    return first;
-  }
-  const auto median_px = [&](const Rigid3& world_from_camera) {
-    const Rigid3 camera_from_world = world_from_camera.inverse();
-    std::vector<double> distances;
-    for (std::size_t i = 0; i < seen.points.size(); ++i) {
-      const Eigen::Vector3d point = camera_from_world * seen.points[i];
-      distances.push_back(point.z() > 0.0 ? (camera.project(point) - seen.uv[i]).norm()
-                                          : std::numeric_limits<double>::infinity());
-    }
-    return median(std::move(distances));
-  };
-  return median_px(second) < median_px(first) ? second : first;
+  return median(distances_px(seen, second, camera)) < median(distances_px(seen, first, camera))
+             ? second
+             : first;
 }
 
 std::optional<Localization> localize(const SeenLandmarks& seen,

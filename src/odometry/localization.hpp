@@ -29,6 +29,11 @@ struct SeenLandmarks {
                                                   const Observations& frame,
                                                   const Camera& camera);
 
+/// How far from where the camera has each landmark it is seen, px; infinite: behind it.
+[[nodiscard]] std::vector<double> distances_px(const SeenLandmarks& seen,
+                                               const Rigid3& world_from_camera,
+                                               const Camera& camera);
+
 /// Which of two world_from_camera the landmarks fit better, by the median of their distances to
 /// where they are seen; the first where both do alike.
 [[nodiscard]] Rigid3 nearer_pose(const Rigid3& first,

@@ -221,10 +221,7 @@ std::vector<int> lost_tracks(const Window& window, std::size_t leaving, const Ke
 void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options) {
   if (static_cast<int>(window.keyframes.size()) >= options.num_keyframes) {
     const std::size_t leaving = leaving_keyframe(window, keyframe);
-    for (const int track_id : lost_tracks(window, leaving, keyframe)) {
-      window.landmarks.erase(track_id);
-      window.fixed.erase(track_id);
-    }
+    drop_landmarks(window, lost_tracks(window, leaving, keyframe));
     window.keyframes.erase(window.keyframes.begin() + static_cast<std::ptrdiff_t>(leaving));
   }
   window.keyframes.push_back(std::move(keyframe));
@@ -261,6 +258,13 @@ void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& o
                          options.max_reprojection_error_px);
   });
   std::erase_if(window.fixed, [&](int track_id) { return !window.landmarks.contains(track_id); });
+}
+
+void drop_landmarks(Window& window, std::span<const int> track_ids) {
+  for (const int track_id : track_ids) {
+    window.landmarks.erase(track_id);
+    window.fixed.erase(track_id);
+  }
 }
 
 void fix_landmarks(Window& window,

@@ -103,10 +103,9 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   }
   const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
   if (found.has_value()) {
-    const Localization of_world =
-        localize_without_thing(frame, found->world_from_camera, localized.inlier_mask)
-            .value_or(*found);
-    return accept_localization(frame, of_world.world_from_camera, is_still, localized);
+    const Rigid3 of_world =
+        pose_without_thing(frame, seen, found->world_from_camera, localized.inlier_mask);
+    return accept_localization(frame, of_world, is_still, localized);
   }
   if (is_still) {  // few landmarks, but nothing moves
     return FrameState::kStationary;
@@ -341,6 +340,7 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
     history_.leave(window_, leaving, keyframe);
   }
   stemvo::add_keyframe(window_, std::move(keyframe), window_options_);
+  drop_landmarks(window_, select<int>(frame.matches.track_ids, moving_.flags(frame.matches)));
   triangulate_landmarks(window_, camera(), window_options_);
   if (refine_every_ > 0 && ++keyframes_since_refinement_ >= refine_every_) {
     keyframes_since_refinement_ = 0;

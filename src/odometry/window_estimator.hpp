@@ -93,12 +93,22 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] double share_that_fits(const Rigid3& cur_from_last,
                                        const Matches& matches,
                                        const std::vector<char>& mask) const;
-  /// Where the pose found fits too little of the image, a thing that moves on its own may be behind
-  /// it. Without that the frame may fit another pose well: then this is the world's, and the
-  /// thing's tracks are moving_ and not in the mask.
-  [[nodiscard]] std::optional<Localization> localize_without_thing(const Frame& frame,
-                                                                   const Rigid3& found,
-                                                                   std::vector<char>& mask);
+  /// Behind the pose found may be a thing that moves on its own. Where another pose fits the world
+  /// better this is returned, and the thing's tracks are moving_ and not in the mask; else `found`.
+  [[nodiscard]] Rigid3 pose_without_thing(const Frame& frame,
+                                          const SeenLandmarks& seen,
+                                          const Rigid3& found,
+                                          std::vector<char>& mask);
+  /// By landmarks: what is far must turn as the near ones say.
+  [[nodiscard]] std::optional<Localization> localize_by_near(const SeenLandmarks& seen,
+                                                             const Rigid3& found,
+                                                             const Matches& matches,
+                                                             std::vector<char>& thing) const;
+  /// By the matches since the last frame, where the pose found fits too little of the image.
+  [[nodiscard]] std::optional<Localization> localize_by_rest(const Rigid3& found,
+                                                             const Matches& matches,
+                                                             const std::vector<char>& mask,
+                                                             std::vector<char>& thing) const;
   void fuse_with_prediction(const Rigid3& before, const SeenLandmarks& seen, double parallax);
   /// Nothing is measured: the last motion goes on.
   void go_on(const Frame& frame) { world_from_camera_ = predict(trust_.trusted(frame.hints)); }

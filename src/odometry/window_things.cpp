@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <cstddef>
+#include <numbers>
 #include <optional>
-#include <utility>
 #include <vector>
 
+#include "geometry/median.hpp"
 #include "odometry/tracks.hpp"
 #include "odometry/window_estimator.hpp"
 
@@ -29,6 +31,42 @@ constexpr double kMinGain = 1.05;
 /// before crossing cars is not made to move with them.
 constexpr double kMinTurn_px = 2.0;
 
+/// A landmark is near that the window sees under more than this.
+constexpr double kNear_rad = 1.5 * std::numbers::pi / 180.0;
+constexpr std::ptrdiff_t kMinNear = 20;
+/// What is far is a thing where it is so much of the image, and most of it is so far from where the
+/// near ones' pose has it, and so many times as far as they are.
+constexpr double kMinFar = 0.2;
+constexpr double kOff_px = 1.0;
+constexpr double kOffTimes = 3.0;
+/// It holds the rotation alone: the near ones place the camera where all do (share of the step); or
+/// with it they fit so many times worse. Elsewhere they are too few, or a shutter that rolls bends
+/// the image.
+constexpr double kMaxShift = 0.03;
+constexpr double kWorse = 2.5;
+
+std::vector<char> without(const std::vector<char>& some, const std::vector<char>& mask) {
+  std::vector<char> rest(mask.size());
+  std::ranges::transform(mask, some, rest.begin(), [](char is_kept, char is_one) {
+    return static_cast<char>(is_kept != 0 && is_one == 0);
+  });
+  return rest;
+}
+
+/// One flag per landmark: its parallax since the first keyframe that sees it.
+std::vector<char> are_near(const Window& window, const SeenLandmarks& seen, const Rigid3& pose) {
+  std::vector<char> flags(seen.points.size());
+  for (std::size_t i = 0; i < flags.size(); ++i) {
+    const auto first = std::ranges::find_if(window.keyframes, [&](const Keyframe& keyframe) {
+      return find_point(keyframe.points, seen.track_ids[i]) != nullptr;
+    });
+    flags[i] =
+        static_cast<char>(first != window.keyframes.end() &&
+                          parallax_rad(seen.points[i], first->world_from_camera, pose) > kNear_rad);
+  }
+  return flags;
+}
+
 }  // namespace
 
 double WindowEstimator::share_that_fits(const Rigid3& cur_from_last,
@@ -40,15 +78,11 @@ double WindowEstimator::share_that_fits(const Rigid3& cur_from_last,
   return cell_votes(cur, fits) / cell_votes(cur, std::vector<char>(fits.size(), 1));
 }
 
-std::optional<Localization> WindowEstimator::localize_without_thing(const Frame& frame,
-                                                                    const Rigid3& found,
-                                                                    std::vector<char>& mask) {
-  const Matches& matches = frame.matches;
-  const Rigid3 cur_from_last = found.inverse() * last_.world_from_camera;
-  if (!is_last_localized_ || matches.prev_frame != last_.frame) {
-    return std::nullopt;
-  }
-  const double fitting = share_that_fits(cur_from_last, matches, mask);
+std::optional<Localization> WindowEstimator::localize_by_rest(const Rigid3& found,
+                                                              const Matches& matches,
+                                                              const std::vector<char>& mask,
+                                                              std::vector<char>& thing) const {
+  const double fitting = share_that_fits(found.inverse() * last_.world_from_camera, matches, mask);
   if (fitting > kMinFitting) {
     return std::nullopt;
   }
@@ -56,10 +90,8 @@ std::optional<Localization> WindowEstimator::localize_without_thing(const Frame&
       initializer_.measure_world({select<Eigen::Vector2d>(matches.prev_uv, mask),
                                   select<Eigen::Vector2d>(matches.cur_uv, mask)},
                                  camera());
-  const std::vector<char> thing = scatter(motion.moving_mask, mask);
-  std::vector<char> rest(mask.size());
-  std::ranges::transform(mask, thing, rest.begin(),
-                         [](char is_kept, char moves) { return is_kept != 0 && moves == 0; });
+  thing = scatter(motion.moving_mask, mask);
+  const std::vector<char> rest = without(thing, mask);
   const auto fits = [&](const std::vector<char>& party) {
     return share_that_fits(motion.cur_from_prev, matches, party);
   };
@@ -69,14 +101,72 @@ std::optional<Localization> WindowEstimator::localize_without_thing(const Frame&
       fits(rest) < kMinOfRest || fits(mask) < kMinGain * fitting) {
     return std::nullopt;
   }
-  const auto world =
-      stemvo::localize(find_seen_landmarks(window_, current_points(matches, rest)),
-                       predict(motion.cur_from_prev.rotation.conjugate()), camera(), localization_);
-  if (world.has_value()) {
-    moving_.add(matches, thing);
-    mask = std::move(rest);
+  return stemvo::localize(find_seen_landmarks(window_, current_points(matches, rest)),
+                          predict(motion.cur_from_prev.rotation.conjugate()), camera(),
+                          localization_);
+}
+
+std::optional<Localization> WindowEstimator::localize_by_near(const SeenLandmarks& seen,
+                                                              const Rigid3& found,
+                                                              const Matches& matches,
+                                                              std::vector<char>& thing) const {
+  const std::vector<char> is_near = are_near(window_, seen, found);
+  const double all_votes = cell_votes(seen.uv, std::vector<char>(is_near.size(), 1));
+  if (std::ranges::count(is_near, char{1}) < kMinNear ||
+      all_votes - cell_votes(seen.uv, is_near) < kMinFar * all_votes) {
+    return std::nullopt;
   }
+  const auto world = stemvo::localize(
+      {select<Eigen::Vector3d>(seen.points, is_near), select<Eigen::Vector2d>(seen.uv, is_near),
+       select<int>(seen.track_ids, is_near)},
+      found, camera(), localization_);
+  if (!world.has_value()) {
+    return std::nullopt;
+  }
+  const auto way = [&](const Rigid3& from) {
+    return (world->world_from_camera.translation - from.translation).norm();
+  };
+  const auto near_px = [&](const std::vector<double>& errors_px) {
+    return median(select<double>(errors_px, is_near));
+  };
+  const std::vector<double> errors_px = distances_px(seen, world->world_from_camera, camera());
+  if (way(found) > kMaxShift * way(last_.world_from_camera) &&
+      near_px(distances_px(seen, found, camera())) < kWorse * near_px(errors_px)) {
+    return std::nullopt;
+  }
+  const std::vector<char> is_far = without(is_near, std::vector<char>(is_near.size(), 1));
+  const double bound_px = std::max(kOff_px, kOffTimes * near_px(errors_px));
+  std::vector<char> is_off(is_near.size());
+  std::ranges::transform(errors_px, is_far, is_off.begin(), [&](double error_px, char far) {
+    return static_cast<char>(far != 0 && error_px > bound_px);
+  });
+  if (median(select<double>(errors_px, is_far)) < bound_px ||
+      cell_votes(seen.uv, is_off) < kMinFar * all_votes) {
+    return std::nullopt;
+  }
+  const std::vector<int> off = select<int>(seen.track_ids, is_off);
+  std::ranges::transform(matches.track_ids, thing.begin(), [&](int track_id) {
+    return static_cast<char>(std::ranges::binary_search(off, track_id));
+  });
   return world;
+}
+
+Rigid3 WindowEstimator::pose_without_thing(const Frame& frame,
+                                           const SeenLandmarks& seen,
+                                           const Rigid3& found,
+                                           std::vector<char>& mask) {
+  const Matches& matches = frame.matches;
+  std::vector<char> thing(mask.size());
+  std::optional<Localization> world = localize_by_near(seen, found, matches, thing);
+  if (!world.has_value() && is_last_localized_ && matches.prev_frame == last_.frame) {
+    world = localize_by_rest(found, matches, mask, thing);
+  }
+  if (!world.has_value()) {
+    return found;
+  }
+  moving_.add(matches, thing);
+  mask = without(thing, mask);
+  return world->world_from_camera;
 }
 
 }  // namespace stemvo

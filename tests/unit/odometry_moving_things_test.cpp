@@ -68,10 +68,11 @@ TEST(MovingThings, ThePathIsTheWorldsFromTheFirstFrameOn) {
   }
 }
 
-TEST(MovingThings, ALorryAheadAtOneDistanceDoesNotHoldTheRotationInATurn) {
+/// A road that turns by so much a frame from frame 20 on, behind a lorry that came at frame 8.
+void expect_true_path_behind_lorry(double turn_rad) {
   std::vector<Rigid3> path(1);
   for (int i = 1; i < 60; ++i) {
-    const double bend = std::clamp(0.0015 * (i - 20), 0.0, 0.02);
+    const double bend = std::clamp(0.0015 * (i - 20), 0.0, turn_rad);
     path.push_back(path.back() * Rigid3(so3_exp({0.0, bend, 0.0}), {0.5 * bend, 0.0, 0.8}));
   }
   DriveTracks drive(path, points_along(path, 400, 3), 0.1, 3);
@@ -81,6 +82,15 @@ TEST(MovingThings, ALorryAheadAtOneDistanceDoesNotHoldTheRotationInATurn) {
   run.add_all();
   EXPECT_GT(run.count(FrameState::kTracking), 54);
   expect_true_path(drive, estimator, 0.02);
+}
+
+TEST(MovingThings, ALorryAheadAtOneDistanceDoesNotHoldTheRotationInATurn) {
+  expect_true_path_behind_lorry(0.02);
+}
+
+// Less than a frame alone would tell.
+TEST(MovingThings, ALorryAheadAtOneDistanceDoesNotHoldTheRotationInALongBend) {
+  expect_true_path_behind_lorry(0.0025);
 }
 
 TEST(StandingCamera, StaysWhileOthersPassBy) {

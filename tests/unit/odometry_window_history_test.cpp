@@ -7,11 +7,10 @@
 namespace stemvo {
 namespace {
 
-TEST(WindowHistory, ALandmarkIsKeptInTheUnitsThatItsLastKeyframeCameIn) {
+/// 1 m apart; all see a landmark 4 m from the first.
+Window four_keyframes(WindowHistory& history, const cv::Mat& image) {
   Window window;
-  WindowHistory history;
-  const cv::Mat image(200, 200, CV_8UC1, cv::Scalar(7));
-  for (int i = 0; i < 4; ++i) {  // 1 m apart; all see a landmark 4 m from the first
+  for (int i = 0; i < 4; ++i) {
     Keyframe keyframe{i, Rigid3(Eigen::Quaterniond::Identity(), {1.0 * i, 0.0, 0.0}), {}};
     keyframe.points.push_back({7, {100.0, 100.0}});
     window.keyframes.push_back(keyframe);
@@ -19,6 +18,26 @@ TEST(WindowHistory, ALandmarkIsKeptInTheUnitsThatItsLastKeyframeCameIn) {
     history.observe(window, image);
   }
   history.end_frame(window);
+  return window;
+}
+
+TEST(WindowHistory, ALandmarkThatTheWindowDropsIsRemoved) {
+  WindowHistory history;
+  const cv::Mat image(200, 200, CV_8UC1, cv::Scalar(7));
+  Window window = four_keyframes(history, image);
+  const LandmarkChanges before = history.changes_since(0, window);
+  ASSERT_EQ(before.landmarks.size(), 1U);
+  window.landmarks.clear();
+  history.observe(window, image);
+  history.end_frame(window);
+  const LandmarkChanges after = history.changes_since(before.version, window);
+  EXPECT_TRUE(after.landmarks.empty());
+  EXPECT_EQ(after.removed, std::vector<int>{before.landmarks.front().id});
+}
+
+TEST(WindowHistory, ALandmarkIsKeptInTheUnitsThatItsLastKeyframeCameIn) {
+  WindowHistory history;
+  Window window = four_keyframes(history, cv::Mat(200, 200, CV_8UC1, cv::Scalar(7)));
   rescale(window, 2.0, Eigen::Vector3d::Zero());
   history.rescale(2.0);
   window.keyframes[0].points.clear();
