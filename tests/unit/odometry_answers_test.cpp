@@ -26,14 +26,17 @@ class Follower {
       places_[landmark.id] = landmark.position;
     }
     num_told_ += changes.landmarks.size();
+    num_removed_ += changes.removed.size();
     version_ = changes.version;
   }
   [[nodiscard]] const std::map<int, Eigen::Vector3d>& places() const { return places_; }
   [[nodiscard]] std::size_t num_told() const { return num_told_; }
+  [[nodiscard]] std::size_t num_removed() const { return num_removed_; }
 
  private:
   std::map<int, Eigen::Vector3d> places_;
   std::size_t num_told_ = 0;
+  std::size_t num_removed_ = 0;
   int version_ = 0;
 };
 
@@ -60,6 +63,7 @@ TEST(OdometryAnswers, WhoFollowsTheChangesHasTheWholeMap) {
   every_fifth.follow(odometry);
   EXPECT_EQ(every_fifth.places(), every_frame.places());
   EXPECT_GT(every_frame.places().size(), 50U);
+  EXPECT_GT(every_frame.num_removed(), 0U);
   const int version = odometry.landmarks_since(0).version;
   EXPECT_THAT(odometry.landmarks_since(version).landmarks, IsEmpty());
   EXPECT_THAT(odometry.landmarks_since(version).removed, IsEmpty());
