@@ -21,6 +21,8 @@ namespace {
 constexpr int kMaxBits = 72;
 /// So much nearer than the next one.
 constexpr double kMaxRatio = 0.85;
+/// A turn by half of it costs few bits.
+constexpr double kRollStep_rad = 0.1;
 /// Side of the square that the comparisons lie in, pixels of the channel.
 constexpr int kPatch_px = 31;
 /// It lies in the image.
@@ -100,11 +102,11 @@ std::vector<Descriptor> describe(const ChannelImage& channel,
   return descriptors;
 }
 
-std::span<const Descriptor> LookDescriptors::for_magnification(double magnification) {
+std::span<const Descriptor> LookDescriptors::for_view(double magnification, double roll_rad) {
   const auto off = [&](double scale) { return std::abs(std::log(scale * magnification)); };
   const auto* const best = std::ranges::min_element(kOtherScales, {}, off);
-  return off(*best) < off(1.0) ? other(static_cast<std::size_t>(best - kOtherScales.begin()))
-                               : as_is_;
+  return other(
+      {off(*best) < off(1.0) ? *best : 1.0, kRollStep_rad * std::round(roll_rad / kRollStep_rad)});
 }
 
 std::vector<DescriptorPair> match_descriptors(std::span<const Descriptor> first,

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <span>
 #include <utility>
 #include <vector>
@@ -57,23 +58,23 @@ class LookDescriptors {
       : as_is_(as_is), describe_as_(describe_as) {}
 
   [[nodiscard]] std::span<const Descriptor> as_is() const { return as_is_; }
-  /// As kOtherLooks[i].
-  [[nodiscard]] std::span<const Descriptor> other(std::size_t i) {
-    if (!describe_as_) {
+  [[nodiscard]] std::span<const Descriptor> other(const OtherLook& look) {
+    if (!describe_as_ || (look.scale == 1.0 && look.roll_rad == 0.0)) {
       return as_is_;
     }
-    if (others_[i].empty()) {
-      others_[i] = describe_as_(kOtherLooks[i]);
+    std::vector<Descriptor>& described = others_[{look.scale, look.roll_rad}];
+    if (described.empty()) {
+      described = describe_as_(look);
     }
-    return others_[i];
+    return described;
   }
-  /// The scale's descriptors that are nearest to a view which this one magnifies.
-  [[nodiscard]] std::span<const Descriptor> for_magnification(double magnification);
+  /// Those like what is seen in a view which this one magnifies and turns.
+  [[nodiscard]] std::span<const Descriptor> for_view(double magnification, double roll_rad);
 
  private:
   std::span<const Descriptor> as_is_;
   DescribeAs describe_as_;
-  std::array<std::vector<Descriptor>, kOtherLooks.size()> others_;
+  std::map<std::pair<double, double>, std::vector<Descriptor>> others_;
 };
 
 /// Bits that differ; inside of what is compiled for a processor that counts bits, it does.

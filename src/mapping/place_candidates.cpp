@@ -63,6 +63,13 @@ SharedView shared_view(const KeptKeyframe& of,
 
 }  // namespace
 
+int num_in_view(const KeptKeyframe& of, const KeptKeyframe& by, const Similarity3& by_from_of) {
+  return static_cast<int>(std::ranges::count_if(of.corners, [&](const KeptCorner& corner) {
+    const Eigen::Vector3d x = by_from_of * corner.in_camera.cast<double>();
+    return corner.has_landmark() && x.z() > 0.0 && is_inside(by.camera.project(x), by.camera);
+  }));
+}
+
 PlaceIndex::PlaceIndex() {
   std::mt19937 random;  // NOLINT: the same on every run
   for (auto& table : bits_) {
@@ -147,19 +154,21 @@ std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> d
 
 std::vector<ExpectedView> expected_views(const KeptMap& map,
                                          std::span<const int> places,
-                                         int number,
+                                         const Similarity3& map_from_keyframe,
+                                         const Eigen::Quaterniond& described_as,
                                          const KeptKeyframe& keyframe) {
+  const double roll = image_roll_rad(map_from_keyframe.rotation) - image_roll_rad(described_as);
   std::vector<ExpectedView> views;
   for (const int place : places) {
     const KeptKeyframe& old = map.keyframes[slot(place)];
-    const Similarity3 motion = map.pose(number).inverse() * map.pose(place);
+    const Similarity3 motion = map_from_keyframe.inverse() * map.pose(place);
     const SharedView there = shared_view(old, keyframe, motion);
     if (there.share < kMinShare) {
       continue;
     }
     const double share = std::min(there.share, shared_view(keyframe, old, motion.inverse()).share);
     if (share >= kMinShare) {
-      views.push_back({place, motion, share, there.magnification});
+      views.push_back({place, motion, share, there.magnification, roll});
     }
   }
   std::ranges::stable_sort(views, std::greater<>(), &ExpectedView::share);

@@ -35,8 +35,6 @@ constexpr double kLooseBound = 2.0;
 constexpr double kFocal_px = 718.0;
 /// A young landmark's depth may be wrong by this share: it lies on a piece of its ray.
 constexpr double kDepthError = 0.15;
-/// How far from where a landmark is expected a corner like it is looked for: rad.
-constexpr double kSearch_rad = 0.075;
 /// Cauchy scale: corners that were detected twice are off by about that.
 constexpr double kLoss_px = 1.0;
 /// Bits in which a landmark differs from a corner near its projection.
@@ -282,11 +280,11 @@ std::optional<PlacePose> locate_in_place(const PlaceView& old, const PlaceView& 
 
 std::optional<Loop> check_place(const PlaceView& old,
                                 const PlaceView& recent,
-                                const std::optional<Similarity3>& expected) {
-  const Least least = expected.has_value() ? kLeastExpected : Least();
-  const auto pairs = expected.has_value() ? match_near(*expected, old, recent,
-                                                       kSearch_rad * recent.camera.mean_focal_px())
-                                          : match_descriptors(old.descriptors, recent.descriptors);
+                                const std::optional<Expectation>& expected) {
+  const auto pairs = expected.has_value()
+                         ? match_near(expected->recent_from_old, old, recent,
+                                      expected->search_rad * recent.camera.mean_focal_px())
+                         : match_descriptors(old.descriptors, recent.descriptors);
   const auto on_old = find_consensus(old, recent, pairs);
   if (!on_old.has_value()) {
     return std::nullopt;
@@ -318,9 +316,12 @@ std::optional<Loop> check_place(const PlaceView& old,
     return static_cast<double>(agreeing(loop.from_to, old, recent, found).size()) >=
            kMinAgreement * static_cast<double>(found.size());
   };
-  if (!is_enough(recent, loop.corners, least) || back.size() < least.num_inliers ||
-      static_cast<double>(on_old->inliers.size()) <
-          least.share * static_cast<double>(pairs.size()) ||
+  const auto reaches = [&](const Least& least) {
+    return is_enough(recent, loop.corners, least) && back.size() >= least.num_inliers &&
+           static_cast<double>(on_old->inliers.size()) >=
+               least.share * static_cast<double>(pairs.size());
+  };
+  if (!(reaches({}) || (expected && expected->is_certain && reaches(kLeastExpected))) ||
       !explained(on_old->inliers) || !explained(swapped(on_recent->inliers))) {
     return std::nullopt;
   }

@@ -35,14 +35,24 @@ struct PlacePose {
 [[nodiscard]] std::optional<PlacePose> locate_in_place(const PlaceView& old,
                                                        const PlaceView& frame);
 
+/// Where a new keyframe should lie to an old one.
+struct Expectation {
+  /// By the map's poses; by a keyframe that was sighted.
+  static constexpr double kByPoses_rad = 0.075;
+  static constexpr double kBySighting_rad = 0.025;
+
+  Similarity3 recent_from_old;
+  double search_rad = kByPoses_rad;  ///< how far from where a landmark should be it may be
+  bool is_certain = true;            ///< poses say that they show one place: fewer are enough
+};
+
 /// The similarity between two keyframes that see the same landmarks, each with its own idea of
 /// where they are: `old` on the new one's, the new one on the old ones, both agreeing, then one
 /// similarity refined on both images. The result's `from` and `to` are not set. nullopt: the two do
 /// not show one place.
-/// With `expected`, the new one from the old one, corners are matched near where the landmarks
-/// should be.
+/// With `expected` corners are matched near where the landmarks should be.
 [[nodiscard]] std::optional<Loop> check_place(const PlaceView& old,
                                               const PlaceView& recent,
-                                              const std::optional<Similarity3>& expected = {});
+                                              const std::optional<Expectation>& expected = {});
 
 }  // namespace stemvo

@@ -33,6 +33,8 @@ constexpr int kMinLookupsApart = 6;
 constexpr std::size_t kMaxTracks = 4;
 constexpr double kMaxNetWay = 0.4;
 constexpr int kMaxCandidates = 3;
+/// So many others are looked at where a place may be seen.
+constexpr std::size_t kMaxBeside = 4;
 /// Bounds of the motion between a frame and one just before, both without a pose: rad, share of the
 /// depth.
 constexpr double kMaxMotion_rad = 0.3;
@@ -142,12 +144,15 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
       places_, [&](const Place& place) { return question.is_elsewhere(place.keyframe); });
   std::vector<Look> looks =
       look_alikes(described, has_others, [&](int place) { return is_far(question, place); });
-  std::ranges::copy(expected_looks(question, described), std::back_inserter(looks));
   std::optional<Loop> found;
-  look_through(std::move(looks), [&](const Look& look) {
+  for (const Sighting& sighting : sightings_.all()) {
+    std::ranges::copy(looks_beside(question, sighting, described), std::back_inserter(looks));
+  }
+  std::ranges::copy(expected_looks(question, described), std::back_inserter(looks));
+  look_through(std::move(looks), [&](const Look& look) -> std::optional<std::vector<Look>> {
     std::optional<Sighting> sighting = look_at(question, look);
     if (!sighting.has_value()) {
-      return Seen::kNothing;
+      return std::vector<Look>();
     }
     const bool joins =
         question.is_elsewhere(look.place) && map.keyframes[slot(look.place)].frame >= 0;
@@ -163,8 +168,8 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
         kept_tracks_ = last_tracks_;
       }
     }
-    sightings_.add(std::move(*sighting));
-    return is_found ? Seen::kEnough : Seen::kSomething;
+    sightings_.add(*sighting);
+    return is_found ? std::nullopt : std::optional(looks_beside(question, *sighting, described));
   });
   return found;
 }
@@ -174,20 +179,21 @@ void PlaceRecognizer::look_through(std::vector<Look> looks, const LookAt& look_a
   const std::size_t num_candidates = looks.size();
   for (std::size_t i = 0; i < looks.size(); ++i) {
     const Look look = looks[i];
+    const auto search_rad = [](const Look& one) {
+      return one.expected.has_value() ? one.expected->search_rad : 0.0;
+    };
     const auto is_same = [&](const Look& other) {
-      return other.place == look.place && other.expected.has_value() == look.expected.has_value();
+      return other.place == look.place && search_rad(other) == search_rad(look);
     };
     if (std::any_of(looks.begin(), looks.begin() + static_cast<std::ptrdiff_t>(i), is_same)) {
       continue;
     }
-    const Seen seen = look_at(look);
-    if (seen == Seen::kEnough) {
+    const std::optional<std::vector<Look>> others = look_at(look);
+    if (!others.has_value()) {
       return;
     }
-    if (seen == Seen::kSomething && i < num_candidates) {
-      for (const int neighbour : neighbours_of(look.place)) {
-        looks.push_back({neighbour, look.seen, {}});
-      }
+    if (i < num_candidates) {
+      std::ranges::copy(*others, std::back_inserter(looks));
     }
   }
 }
@@ -202,7 +208,7 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::look_alikes(
   };
   vote(described.as_is());
   for (std::size_t i = 0; in_all_ways && i < kOtherLooks.size(); ++i) {
-    vote(described.other(i));
+    vote(described.other(kOtherLooks[i]));
   }
   std::ranges::stable_sort(found, std::greater<>(),
                            [](const auto& one) { return one.first.votes; });
@@ -210,7 +216,7 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::look_alikes(
   for (const auto& [place, seen] : found) {
     if (std::ssize(looks) < kMaxCandidates &&
         std::ranges::find(looks, place.keyframe, &Look::place) == looks.end()) {
-      looks.push_back({place.keyframe, seen, {}});
+      looks.push_back({place.keyframe, seen});
     }
   }
   return looks;
@@ -228,7 +234,8 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::expected_looks(const Questio
     }
   }
   std::vector<ExpectedView> views =
-      expected_views(question.map, places, question.number, question.keyframe);
+      expected_views(question.map, places, question.map.pose(question.number),
+                     question.map.pose(question.number).rotation, question.keyframe);
   const auto num_alike = std::ranges::count_if(views, [](const ExpectedView& view) {
     return view.share >= kMinAlike && std::abs(std::log(view.magnification)) < kMaxLogAlike;
   });
@@ -236,8 +243,37 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::expected_looks(const Questio
   views.resize(std::min<std::size_t>(views.size(), kMaxCandidates));
   std::vector<Look> looks;
   for (const ExpectedView& view : views) {
-    looks.push_back(
-        {view.place, described.for_magnification(view.magnification), view.keyframe_from_place});
+    looks.push_back({view.place, described.for_view(view.magnification, view.roll_rad),
+                     Expectation{view.keyframe_from_place}});
+  }
+  return looks;
+}
+
+/// Where a keyframe that was sighted tells that the present one is, if it was right.
+std::vector<PlaceRecognizer::Look> PlaceRecognizer::looks_beside(const Question& question,
+                                                                 const Sighting& sighting,
+                                                                 LookDescriptors& described) const {
+  const KeptMap& map = question.map;
+  const Loop& loop = sighting.loop;
+  const Similarity3 map_from_keyframe =
+      map.pose(loop.from) * loop.from_to * map.pose(loop.to).inverse() * map.pose(question.number);
+  std::vector<int> places;
+  for (const Place& place : places_) {
+    const int at = place.keyframe;
+    if (is_far(question, at) &&
+        question.components[slot(at)] == question.components[slot(loop.from)] &&
+        !(at == loop.from && sighting.lookup == num_lookups_)) {
+      places.push_back(at);
+    }
+  }
+  std::vector<ExpectedView> views = expected_views(
+      map, places, map_from_keyframe, map.pose(question.number).rotation, question.keyframe);
+  views.resize(std::min<std::size_t>(views.size(), kMaxBeside));
+  std::vector<Look> looks;
+  for (const ExpectedView& view : views) {
+    looks.push_back({view.place, described.for_view(view.magnification, view.roll_rad),
+                     Expectation{view.keyframe_from_place, Expectation::kBySighting_rad,
+                                 sighting.is_by_poses}});
   }
   return looks;
 }
@@ -258,7 +294,15 @@ std::optional<Sighting> PlaceRecognizer::look_at(const Question& question, const
   loop->to = number;
   const double share =
       static_cast<double>(loop->corners.size()) / static_cast<double>(keyframe.corners.size());
-  return Sighting{num_lookups_, share, look.expected.has_value(), std::move(*loop)};
+  const double common = static_cast<double>(loop->corners.size()) /
+                        std::max(1, std::min(num_in_view(old, keyframe, loop->from_to.inverse()),
+                                             num_in_view(keyframe, old, loop->from_to)));
+  return Sighting{num_lookups_,
+                  share,
+                  common,
+                  look.expected.has_value(),
+                  look.expected && look.expected->is_certain,
+                  std::move(*loop)};
 }
 
 bool PlaceRecognizer::has_come_back(const KeptMap& map, const Place& place, int number) const {
@@ -292,34 +336,41 @@ std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
   const std::vector<Similarity3> before = std::exchange(located_, {});
   LookDescriptors described(descriptors, describe_as);
   std::optional<LocatedFrame> located;
-  look_through(look_alikes(described, true, [](int) { return true; }), [&](const Look& look) {
-    const KeptKeyframe& old = keyframe_of(map, look.place);
-    const auto found = locate_in_place(view_of(old), {camera, corners, look.seen});
-    if (!found.has_value()) {
-      return Seen::kNothing;
-    }
-    const Similarity3 map_from_camera = map.pose(look.place) * Similarity3(found->old_from_camera);
-    const auto is_near = [&](double max_turn_rad, double max_shift) {
-      return [&, max_turn_rad, max_shift](const Similarity3& other) {
-        const Similarity3 difference = map_from_camera.inverse() * other;
-        return turn_of(difference) < max_turn_rad &&
-               difference.translation.norm() < max_shift * median_depth(old.corners);
-      };
-    };
-    const bool is_certain =
-        std::ranges::any_of(located_, is_near(kMaxSameTurn_rad, kMaxSameShift)) ||
-        std::ranges::any_of(before, is_near(kMaxMotion_rad, kMaxMotion));
-    located_.push_back(map_from_camera);
-    if (!is_certain) {
-      return Seen::kSomething;
-    }
-    located = {look.place, found->old_from_camera, {}};
-    for (const auto& [mine, other] : found->corners) {
-      located->landmarks.emplace_back(corners[slot(other)].track_id,
-                                      old.corners[slot(mine)].in_camera.cast<double>());
-    }
-    return Seen::kEnough;
-  });
+  look_through(look_alikes(described, true, [](int) { return true; }),
+               [&](const Look& look) -> std::optional<std::vector<Look>> {
+                 std::vector<Look> others;
+                 const KeptKeyframe& old = keyframe_of(map, look.place);
+                 const auto found = locate_in_place(view_of(old), {camera, corners, look.seen});
+                 if (!found.has_value()) {
+                   return others;
+                 }
+                 const Similarity3 map_from_camera =
+                     map.pose(look.place) * Similarity3(found->old_from_camera);
+                 const auto is_near = [&](double max_turn_rad, double max_shift) {
+                   return [&, max_turn_rad, max_shift](const Similarity3& other) {
+                     const Similarity3 difference = map_from_camera.inverse() * other;
+                     return turn_of(difference) < max_turn_rad &&
+                            difference.translation.norm() < max_shift * median_depth(old.corners);
+                   };
+                 };
+                 const bool is_certain =
+                     std::ranges::any_of(located_, is_near(kMaxSameTurn_rad, kMaxSameShift)) ||
+                     std::ranges::any_of(before, is_near(kMaxMotion_rad, kMaxMotion));
+                 located_.push_back(map_from_camera);
+                 if (!is_certain) {
+                   for (const int neighbour : neighbours_of(look.place)) {
+                     others.push_back({neighbour, look.seen});
+                   }
+                   return others;
+                 }
+                 located = {look.place, found->old_from_camera, {}};
+                 for (const auto& [mine, other] : found->corners) {
+                   located->landmarks.emplace_back(
+                       corners[slot(other)].track_id,
+                       old.corners[slot(mine)].in_camera.cast<double>());
+                 }
+                 return std::nullopt;
+               });
   may_be_locating_ = !located && before.empty() && !located_.empty();
   return located;
 }

@@ -86,7 +86,7 @@ class PlaceRecognizer {
   struct Look {
     int place = 0;
     std::span<const Descriptor> seen;
-    std::optional<Similarity3> expected;  ///< the frame from the place, where that is known
+    std::optional<Expectation> expected = {};
   };
   /// What recognize() is asked.
   struct Question {
@@ -101,11 +101,14 @@ class PlaceRecognizer {
              components[static_cast<std::size_t>(number)];
     }
   };
-  enum class Seen { kNothing, kSomething, kEnough };
-  /// Looks at each place once, and at the neighbours of those in which something is seen, until it
-  /// is enough.
+  /// Looks at each place once, and then at those that `look_at` names for what it sees, until it is
+  /// enough: nullopt.
   template <typename LookAt>
   void look_through(std::vector<Look> looks, const LookAt& look_at) const;
+  /// If a sighting is right.
+  [[nodiscard]] std::vector<Look> looks_beside(const Question& question,
+                                               const Sighting& sighting,
+                                               LookDescriptors& described) const;
   [[nodiscard]] std::vector<Look> look_alikes(LookDescriptors& described,
                                               bool in_all_ways,
                                               const std::function<bool(int)>& may_be) const;

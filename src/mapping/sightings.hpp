@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <utility>
@@ -17,13 +18,15 @@ inline constexpr double kMaxSameShift = 0.1;
 
 /// A check of a keyframe against a place that went well.
 struct Sighting {
-  int lookup = 0;      ///< its number
-  double share = 0.0;  ///< of the keyframe's corners that agree
+  int lookup = 0;       ///< its number
+  double share = 0.0;   ///< of the keyframe's corners that agree
+  double common = 0.0;  ///< share of the landmarks that both should see
   bool was_expected = false;
+  bool is_by_poses = false;  ///< the map's poses told where to look
   Loop loop;
 
   /// Streets that share a house look alike, too, but not all of it.
-  [[nodiscard]] bool may_join() const { return share >= 0.25; }
+  [[nodiscard]] bool may_join() const { return std::max(share, common) >= 0.25; }
 };
 
 /// The sightings of the last lookups, which confirm each other.
@@ -32,6 +35,7 @@ class Sightings {
   /// Forgets those that are too old for lookup `number`, around which things lie this deep.
   void begin_lookup(int number, double depth);
   void add(Sighting sighting) { sightings_.push_back(std::move(sighting)); }
+  [[nodiscard]] const std::vector<Sighting>& all() const { return sightings_; }
   /// The places of another map that say the same in one lookup explain the keyframe, of so many
   /// corners, together: all of these sightings have the share of it.
   void share_what_joins(const KeptMap& map, std::size_t num_corners, Sighting& sighting);

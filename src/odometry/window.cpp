@@ -19,8 +19,10 @@
 namespace stemvo {
 namespace {
 
-/// Tracks that the oldest keyframe and the one that comes must share for it to stay.
+/// The oldest keyframe stays while so many landmarks are seen by it and by the one that comes,
+/// under such a parallax: what lies far off does not connect their positions.
 constexpr int kMinConnection = 20;
+constexpr double kConnecting_rad = std::numbers::pi / 180.0;
 /// The last keyframes, which stay, the coming one among them.
 constexpr std::size_t kNumRecent = 4;
 
@@ -184,7 +186,15 @@ double parallax_rad(const Eigen::Vector3d& point_in_world,
 
 std::size_t leaving_keyframe(const Window& window, const Keyframe& coming) {
   const std::deque<Keyframe>& keyframes = window.keyframes;
-  if (common_points(keyframes.front().points, coming.points).size() < kMinConnection) {
+  const Keyframe& oldest = keyframes.front();
+  const auto connects = [&](const Observation& point) {
+    const auto landmark = window.landmarks.find(point.track_id);
+    return landmark != window.landmarks.end() &&
+           find_point(oldest.points, point.track_id) != nullptr &&
+           parallax_rad(landmark->second, oldest.world_from_camera, coming.world_from_camera) >
+               kConnecting_rad;
+  };
+  if (std::ranges::count_if(coming.points, connects) < kMinConnection) {
     return 0;
   }
   const auto position = [&](std::size_t i) -> const Eigen::Vector3d& {

@@ -71,6 +71,28 @@ class Handheld : public OtherCameras {
 
 TEST_F(Handheld, Forwards) { expect_followed(0, 1, 400, 0.055); }
 TEST_F(Handheld, Backwards) { expect_followed(399, -1, 400, 0.095); }
+/// Two seconds see nothing; the map that begins then is joined to the one before, which the desk
+/// shows.
+TEST_F(Handheld, BlackForTwoSeconds) {
+  constexpr int kFirst = 100;
+  constexpr int kEnd = 160;
+  const fs::path data = shared_data() / "handheld";
+  const fs::path images = folder_ / "images";
+  fs::copy(data / "images", images, fs::copy_options::create_symlinks);
+  const cv::Mat black = cv::Mat::zeros(480, 640, CV_8U);
+  for (int i = kFirst; i < kEnd; ++i) {
+    const fs::path image = images / fmt::format("{:06d}.jpg", i);
+    fs::remove(image);
+    ASSERT_TRUE(cv::imwrite(image.string(), black));
+  }
+  expect_poses({images, "--camera", (data / "camera.yaml").string(), "--gt",
+                (data / "poses.txt").string(), "--set", "scale.source=none"},
+               400);
+  const auto metrics = nlohmann::json::parse(read_file(folder_ / "out/metrics.json"));
+  EXPECT_GE(metrics.at("map").at("loops").get<int>(), 1);
+  EXPECT_LE(metrics.at("map").at("ate_rmse_m").at("sim3").get<double>(), 0.1);  // two maps: 0.29
+  EXPECT_EQ(column(read_file(folder_ / "out/frames.csv"), "map_id").back(), "0");
+}
 TEST_F(Handheld, EverySecondFrame) { expect_followed(0, 2, 200, 0.065); }
 TEST_F(Handheld, EveryThirdFrame) { expect_followed(0, 3, 134, 0.055); }
 

@@ -118,13 +118,14 @@ TEST(PlaceCheck, WhatIsExpectedNeedsFewerCorners) {
   expected.rotation = truth.rotation * so3_exp({0.0, 0.02, 0.01});
   expected.scale *= 1.1;
   EXPECT_FALSE(check_place(view_of(old), view_of(recent)).has_value());
-  const auto loop = check_place(view_of(old), view_of(recent), expected.inverse());
+  const auto loop = check_place(view_of(old), view_of(recent), Expectation{expected.inverse()});
   ASSERT_TRUE(loop.has_value());
   EXPECT_LT(turn_rad(loop->from_to, truth), 0.005);
   EXPECT_LT(std::abs(std::log(loop->from_to.scale / truth.scale)), 0.05);
   DescribedPoints other = street(2);
   const KeptKeyframe elsewhere = other.see(kNewPose, kNewUnits, 100000);
-  EXPECT_FALSE(check_place(view_of(old), view_of(elsewhere), expected.inverse()).has_value());
+  EXPECT_FALSE(
+      check_place(view_of(old), view_of(elsewhere), Expectation{expected.inverse()}).has_value());
 }
 
 TEST(PlaceCheck, LocatesAFrameWithoutLandmarks) {

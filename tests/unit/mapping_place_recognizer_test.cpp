@@ -28,6 +28,9 @@ struct TwoRounds {
     for (std::size_t i = num_known; i < keyframe.corners.size(); ++i) {
       keyframe.descriptors[i] = seen.draw();
     }
+    for (Descriptor& descriptor : keyframe.descriptors) {
+      descriptor = seen.changed(descriptor, bits_changed);
+    }
     keyframe.frame = 5 * number;
     map.map_from_keyframe.emplace_back(keyframe.world_from_camera);
     map.keyframes.push_back(keyframe);
@@ -35,7 +38,7 @@ struct TwoRounds {
       return std::nullopt;
     }
     ++num_lookups;
-    const std::vector<int> components(map.keyframes.size());
+    components.resize(map.keyframes.size(), component);
     const auto loop = recognizer.recognize(map, components, number, keyframe);
     if (!recognizer.shows_kept_place()) {
       recognizer.add(number, keyframe);
@@ -56,6 +59,9 @@ struct TwoRounds {
   }
 
   std::vector<Rigid3> path;
+  std::vector<int> components;  ///< of each keyframe
+  int component = 0;            ///< of those to come
+  double bits_changed = 0.0;    ///< share of what they are described by
   DescribedPoints points;
   DescribedPoints elsewhere;
   KeptMap map;
@@ -124,6 +130,27 @@ TEST(PlaceRecognizer, APlaceIsExpectedWhereTheCameraCameBack) {
     }
   }
   EXPECT_GT(num_loops, 5);
+}
+
+/// Corners look so different that they are known only where they are looked for: the one view that
+/// shows the place tells where.
+TEST(PlaceRecognizer, ASightingTellsWhereTheNextOnesLie) {
+  constexpr double kHardlyAlike = 0.22;
+  for (const bool has_one_clear_view : {false, true}) {
+    TwoRounds drive(3);
+    drive.first_round();
+    drive.component = 1;
+    int num_joined = 0;
+    for (int i = 20; i < 30; ++i) {
+      drive.bits_changed = has_one_clear_view && i == 20 ? 0.0 : kHardlyAlike;
+      const auto loop = drive.add(drive.points, drive.aside(i), kUnits);
+      if (loop.has_value()) {
+        ++num_joined;
+        EXPECT_NEAR(loop->from_to.scale, 1.0 / kUnits, 0.02);
+      }
+    }
+    EXPECT_EQ(num_joined > 0, has_one_clear_view);
+  }
 }
 
 TEST(PlaceRecognizer, OneSightingIsNotBelieved) {

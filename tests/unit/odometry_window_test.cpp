@@ -29,17 +29,28 @@ Keyframe keyframe_along(int i, int first_id) {
   return keyframe;
 }
 
-TEST(Window, TheOldestKeyframeLeavesOnceFewTracksConnectIt) {
+/// Landmarks of all these tracks, so far ahead.
+void put_landmarks(Window& window, int num_tracks, double depth_m) {
+  for (int id = 0; id < num_tracks; ++id) {
+    window.landmarks[id] = {10.0, 0.1 * id, depth_m};
+  }
+}
+
+TEST(Window, TheOldestKeyframeLeavesOnceFewLandmarksConnectIt) {
   Window window;
+  put_landmarks(window, 50, 40.0);
   for (int i = 0; i < 8; ++i) {
     add_keyframe(window, keyframe_along(i, 2 * i), {});
   }
   EXPECT_EQ(leaving_keyframe(window, keyframe_along(8, 11)), 0U);  // 19 in common
   EXPECT_NE(leaving_keyframe(window, keyframe_along(8, 10)), 0U);  // 20
+  put_landmarks(window, 50, 400.0);                                // which tell of the turn alone
+  EXPECT_EQ(leaving_keyframe(window, keyframe_along(8, 10)), 0U);
 }
 
 TEST(Window, OneViewIsKeptFromItsFirstKeyframeOn) {
   Window window;
+  put_landmarks(window, 30, 40.0);
   for (int i = 0; i < 30; ++i) {
     add_keyframe(window, keyframe_along(i, 0), {});
   }
