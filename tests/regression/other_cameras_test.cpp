@@ -74,16 +74,17 @@ TEST_F(Handheld, Backwards) { expect_followed(399, -1, 400, 0.095); }
 /// Two seconds see nothing; the map that begins then is joined to the one before, which the desk
 /// shows.
 TEST_F(Handheld, BlackForTwoSeconds) {
-  constexpr int kFirst = 100;
-  constexpr int kEnd = 160;
   const fs::path data = shared_data() / "handheld";
   const fs::path images = folder_ / "images";
-  fs::copy(data / "images", images, fs::copy_options::create_symlinks);
+  fs::create_directory(images);
   const cv::Mat black = cv::Mat::zeros(480, 640, CV_8U);
-  for (int i = kFirst; i < kEnd; ++i) {
-    const fs::path image = images / fmt::format("{:06d}.jpg", i);
-    fs::remove(image);
-    ASSERT_TRUE(cv::imwrite(image.string(), black));
+  for (int i = 0; i < 400; ++i) {
+    const std::string name = fmt::format("{:06d}.jpg", i);
+    if (i < 100 || i >= 160) {
+      fs::create_symlink(data / "images" / name, images / name);
+    } else {
+      ASSERT_TRUE(cv::imwrite((images / name).string(), black));
+    }
   }
   expect_poses({images, "--camera", (data / "camera.yaml").string(), "--gt",
                 (data / "poses.txt").string(), "--set", "scale.source=none"},
