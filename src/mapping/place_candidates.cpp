@@ -2,6 +2,7 @@
 #include "mapping/place_candidates.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <random>
@@ -65,8 +66,11 @@ SharedView shared_view(const KeptKeyframe& of,
 
 int num_in_view(const KeptKeyframe& of, const KeptKeyframe& by, const Similarity3& by_from_of) {
   return static_cast<int>(std::ranges::count_if(of.corners, [&](const KeptCorner& corner) {
+    if (!corner.has_landmark()) {
+      return false;
+    }
     const Eigen::Vector3d x = by_from_of * corner.in_camera.cast<double>();
-    return corner.has_landmark() && x.z() > 0.0 && is_inside(by.camera.project(x), by.camera);
+    return x.z() > 0.0 && is_inside(by.camera.project(x), by.camera);
   }));
 }
 
@@ -157,7 +161,8 @@ std::vector<ExpectedView> expected_views(const KeptMap& map,
                                          const Similarity3& map_from_keyframe,
                                          const Eigen::Quaterniond& described_as,
                                          const KeptKeyframe& keyframe) {
-  const double roll = image_roll_rad(map_from_keyframe.rotation) - image_roll_rad(described_as);
+  const double roll = std::remainder(
+      image_roll_rad(map_from_keyframe.rotation) - image_roll_rad(described_as), 2.0 * M_PI);
   std::vector<ExpectedView> views;
   for (const int place : places) {
     const KeptKeyframe& old = map.keyframes[slot(place)];

@@ -20,8 +20,10 @@ struct Least {
   int num_cells = 12;
   double share = 0.0;
 };
+/// Where they were looked for, some are found of anything.
+constexpr Least kLeastBySighting{30, 12, 0.4};
 /// The poses say already that it is the place.
-constexpr Least kLeastExpected{20, 6, 0.4};
+constexpr Least kLeastByPoses{20, 6, 0.4};
 constexpr int kColumns = 6;
 constexpr int kRows = 4;
 /// So many of so many pairs or more are enough to look for more where a pose has them.
@@ -316,12 +318,12 @@ std::optional<Loop> check_place(const PlaceView& old,
     return static_cast<double>(agreeing(loop.from_to, old, recent, found).size()) >=
            kMinAgreement * static_cast<double>(found.size());
   };
-  const auto reaches = [&](const Least& least) {
-    return is_enough(recent, loop.corners, least) && back.size() >= least.num_inliers &&
-           static_cast<double>(on_old->inliers.size()) >=
-               least.share * static_cast<double>(pairs.size());
-  };
-  if (!(reaches({}) || (expected && expected->is_certain && reaches(kLeastExpected))) ||
+  const Least least = !expected.has_value()  ? Least()
+                      : expected->is_certain ? kLeastByPoses
+                                             : kLeastBySighting;
+  if (!is_enough(recent, loop.corners, least) || back.size() < least.num_inliers ||
+      static_cast<double>(on_old->inliers.size()) <
+          least.share * static_cast<double>(pairs.size()) ||
       !explained(on_old->inliers) || !explained(swapped(on_recent->inliers))) {
     return std::nullopt;
   }

@@ -7,6 +7,7 @@
 #include <functional>
 #include <iterator>
 #include <limits>
+#include <ranges>
 
 #include "geometry/median.hpp"
 #include "mapping/place_candidates.hpp"
@@ -33,7 +34,8 @@ constexpr int kMinLookupsApart = 6;
 constexpr std::size_t kMaxTracks = 4;
 constexpr double kMaxNetWay = 0.4;
 constexpr int kMaxCandidates = 3;
-/// So many others are looked at where a place may be seen.
+/// So many sightings of the lookups before tell where to look, each at so many places.
+constexpr std::ptrdiff_t kMaxSightings = 3;
 constexpr std::size_t kMaxBeside = 4;
 /// Bounds of the motion between a frame and one just before, both without a pose: rad, share of the
 /// depth.
@@ -144,11 +146,13 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
       places_, [&](const Place& place) { return question.is_elsewhere(place.keyframe); });
   std::vector<Look> looks =
       look_alikes(described, has_others, [&](int place) { return is_far(question, place); });
-  std::optional<Loop> found;
-  for (const Sighting& sighting : sightings_.all()) {
+  // The last ones are the nearest.
+  for (const Sighting& sighting :
+       sightings_.all() | std::views::reverse | std::views::take(kMaxSightings)) {
     std::ranges::copy(looks_beside(question, sighting, described), std::back_inserter(looks));
   }
   std::ranges::copy(expected_looks(question, described), std::back_inserter(looks));
+  std::optional<Loop> found;
   look_through(std::move(looks), [&](const Look& look) -> std::optional<std::vector<Look>> {
     std::optional<Sighting> sighting = look_at(question, look);
     if (!sighting.has_value()) {
@@ -175,7 +179,7 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
 }
 
 template <typename LookAt>
-void PlaceRecognizer::look_through(std::vector<Look> looks, const LookAt& look_at) const {
+void PlaceRecognizer::look_through(std::vector<Look> looks, const LookAt& look_at) {
   const std::size_t num_candidates = looks.size();
   for (std::size_t i = 0; i < looks.size(); ++i) {
     const Look look = looks[i];
@@ -255,6 +259,9 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::looks_beside(const Question&
                                                                  LookDescriptors& described) const {
   const KeptMap& map = question.map;
   const Loop& loop = sighting.loop;
+  if (question.components[slot(loop.to)] != question.components[slot(question.number)]) {
+    return {};  // no motion leads from there to here
+  }
   const Similarity3 map_from_keyframe =
       map.pose(loop.from) * loop.from_to * map.pose(loop.to).inverse() * map.pose(question.number);
   std::vector<int> places;
@@ -273,7 +280,7 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::looks_beside(const Question&
   for (const ExpectedView& view : views) {
     looks.push_back({view.place, described.for_view(view.magnification, view.roll_rad),
                      Expectation{view.keyframe_from_place, Expectation::kBySighting_rad,
-                                 sighting.is_by_poses}});
+                                 sighting.is_by_poses && !question.is_elsewhere(loop.from)}});
   }
   return looks;
 }
@@ -294,15 +301,12 @@ std::optional<Sighting> PlaceRecognizer::look_at(const Question& question, const
   loop->to = number;
   const double share =
       static_cast<double>(loop->corners.size()) / static_cast<double>(keyframe.corners.size());
-  const double common = static_cast<double>(loop->corners.size()) /
-                        std::max(1, std::min(num_in_view(old, keyframe, loop->from_to.inverse()),
-                                             num_in_view(keyframe, old, loop->from_to)));
-  return Sighting{num_lookups_,
-                  share,
-                  common,
-                  look.expected.has_value(),
-                  look.expected && look.expected->is_certain,
-                  std::move(*loop)};
+  const int num_in_common = num_in_view(old, keyframe, loop->from_to.inverse());
+  return Sighting{.lookup = num_lookups_,
+                  .share = share,
+                  .common = static_cast<double>(loop->corners.size()) / std::max(1, num_in_common),
+                  .is_by_poses = look.expected.has_value() && look.expected->is_certain,
+                  .loop = std::move(*loop)};
 }
 
 bool PlaceRecognizer::has_come_back(const KeptMap& map, const Place& place, int number) const {

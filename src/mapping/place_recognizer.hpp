@@ -101,11 +101,11 @@ class PlaceRecognizer {
              components[static_cast<std::size_t>(number)];
     }
   };
-  /// Looks at each place once, and then at those that `look_at` names for what it sees, until it is
-  /// enough: nullopt.
+  /// Looks at each place once in each way, and then at those that `look_at` names for what it sees
+  /// in these, until it is enough: nullopt.
   template <typename LookAt>
-  void look_through(std::vector<Look> looks, const LookAt& look_at) const;
-  /// If a sighting is right.
+  static void look_through(std::vector<Look> looks, const LookAt& look_at);
+  /// Places of a sighting's map, where they are if it is right.
   [[nodiscard]] std::vector<Look> looks_beside(const Question& question,
                                                const Sighting& sighting,
                                                LookDescriptors& described) const;

@@ -12,8 +12,8 @@ namespace stemvo {
 namespace {
 
 constexpr int kMaxLookupsApart = 3;
-/// So many sightings say that two maps are one.
-constexpr std::ptrdiff_t kMinJoinSightings = 3;
+/// Sightings of so many keyframes say that two maps are one.
+constexpr std::ptrdiff_t kMinJoinLookups = 3;
 constexpr double kMaxLogScale = 0.1;
 
 }  // namespace
@@ -56,13 +56,18 @@ bool Sightings::confirm(const KeptMap& map, const Sighting& sighting, bool joins
   if (joins && !sighting.may_join()) {
     return false;
   }
-  const auto num = std::ranges::count_if(sightings_, [&](const Sighting& other) {
+  std::set<int> lookups = {sighting.lookup};
+  bool is_confirmed = false;
+  for (const Sighting& other : sightings_) {
+    const bool is_another_look = other.lookup != sighting.lookup;
     const bool is_same_view = other.loop.from == sighting.loop.from &&
-                              (!sighting.was_expected || other.lookup == sighting.lookup);
-    return !is_same_view && !(joins && (other.lookup == sighting.lookup || !other.may_join())) &&
-           say_the_same(map, other, sighting);
-  });
-  return num >= (joins ? kMinJoinSightings - 1 : 1);
+                              !((joins || sighting.is_by_poses) && is_another_look);
+    if (!is_same_view && (!joins || other.may_join()) && say_the_same(map, other, sighting)) {
+      is_confirmed = true;
+      lookups.insert(other.lookup);
+    }
+  }
+  return joins ? std::ssize(lookups) >= kMinJoinLookups : is_confirmed;
 }
 
 }  // namespace stemvo

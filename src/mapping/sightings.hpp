@@ -18,11 +18,10 @@ inline constexpr double kMaxSameShift = 0.1;
 
 /// A check of a keyframe against a place that went well.
 struct Sighting {
-  int lookup = 0;       ///< its number
-  double share = 0.0;   ///< of the keyframe's corners that agree
-  double common = 0.0;  ///< share of the landmarks that both should see
-  bool was_expected = false;
-  bool is_by_poses = false;  ///< the map's poses told where to look
+  int lookup = 0;            ///< its number
+  double share = 0.0;        ///< of the keyframe's corners that agree
+  double common = 0.0;       ///< of the place's landmarks that it should see, those it does
+  bool is_by_poses = false;  ///< the map's poses told where to look, or where the one before was
   Loop loop;
 
   /// Streets that share a house look alike, too, but not all of it.

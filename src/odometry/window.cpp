@@ -20,7 +20,7 @@ namespace stemvo {
 namespace {
 
 /// The oldest keyframe stays while so many landmarks are seen by it and by the one that comes,
-/// under such a parallax: what lies far off does not connect their positions.
+/// with more than such a parallax: what lies far off does not connect their positions.
 constexpr int kMinConnection = 20;
 constexpr double kConnecting_rad = std::numbers::pi / 180.0;
 /// The last keyframes, which stay, the coming one among them.
