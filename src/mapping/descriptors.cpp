@@ -105,8 +105,9 @@ std::vector<Descriptor> describe(const ChannelImage& channel,
 std::span<const Descriptor> LookDescriptors::for_view(double magnification, double roll_rad) {
   const auto off = [&](double scale) { return std::abs(std::log(scale * magnification)); };
   const auto* const best = std::ranges::min_element(kOtherScales, {}, off);
+  const double roll = std::remainder(roll_rad, 2.0 * M_PI);
   return other(
-      {off(*best) < off(1.0) ? *best : 1.0, kRollStep_rad * std::round(roll_rad / kRollStep_rad)});
+      {off(*best) < off(1.0) ? *best : 1.0, kRollStep_rad * std::round(roll / kRollStep_rad)});
 }
 
 std::vector<DescriptorPair> match_descriptors(std::span<const Descriptor> first,

@@ -2,9 +2,9 @@
 #include "mapping/place_candidates.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <random>
 #include <utility>
 
@@ -28,8 +28,18 @@ constexpr double kMinShare = 0.3;
 /// So many corners stand for all.
 constexpr std::size_t kSamples = 64;
 
-bool is_inside(const Eigen::Vector2d& uv, const Camera& camera) {
-  return uv.x() >= 0.0 && uv.y() >= 0.0 && uv.x() < camera.width_px && uv.y() < camera.height_px;
+/// A landmark in the camera of `by`; nullopt: it has none, or it lies outside of the image.
+std::optional<Eigen::Vector3d> seen_by(const KeptKeyframe& by,
+                                       const Similarity3& by_from_of,
+                                       const KeptCorner& corner) {
+  const Eigen::Vector3d x = by_from_of * corner.in_camera.cast<double>();
+  if (!corner.has_landmark() || x.z() <= 0.0) {
+    return std::nullopt;
+  }
+  const Eigen::Vector2d uv = by.camera.project(x);
+  const bool is_inside =
+      uv.x() >= 0.0 && uv.y() >= 0.0 && uv.x() < by.camera.width_px && uv.y() < by.camera.height_px;
+  return is_inside ? std::optional(x) : std::nullopt;
 }
 
 struct SharedView {
@@ -49,10 +59,9 @@ SharedView shared_view(const KeptKeyframe& of,
       continue;
     }
     ++num_landmarks;
-    const Eigen::Vector3d point = of.corners[i].in_camera.cast<double>();
-    const Eigen::Vector3d x = by_from_of * point;
-    if (x.z() > 0.0 && is_inside(by.camera.project(x), by.camera)) {
-      nearer.push_back(by_from_of.scale * point.z() / x.z());
+    if (const auto x = seen_by(by, by_from_of, of.corners[i])) {
+      nearer.push_back(by_from_of.scale * static_cast<double>(of.corners[i].in_camera.z()) /
+                       x->z());
     }
   }
   if (nearer.empty()) {
@@ -66,11 +75,7 @@ SharedView shared_view(const KeptKeyframe& of,
 
 int num_in_view(const KeptKeyframe& of, const KeptKeyframe& by, const Similarity3& by_from_of) {
   return static_cast<int>(std::ranges::count_if(of.corners, [&](const KeptCorner& corner) {
-    if (!corner.has_landmark()) {
-      return false;
-    }
-    const Eigen::Vector3d x = by_from_of * corner.in_camera.cast<double>();
-    return x.z() > 0.0 && is_inside(by.camera.project(x), by.camera);
+    return seen_by(by, by_from_of, corner).has_value();
   }));
 }
 
@@ -159,10 +164,7 @@ std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> d
 std::vector<ExpectedView> expected_views(const KeptMap& map,
                                          std::span<const int> places,
                                          const Similarity3& map_from_keyframe,
-                                         const Eigen::Quaterniond& described_as,
                                          const KeptKeyframe& keyframe) {
-  const double roll = std::remainder(
-      image_roll_rad(map_from_keyframe.rotation) - image_roll_rad(described_as), 2.0 * M_PI);
   std::vector<ExpectedView> views;
   for (const int place : places) {
     const KeptKeyframe& old = map.keyframes[slot(place)];
@@ -173,7 +175,7 @@ std::vector<ExpectedView> expected_views(const KeptMap& map,
     }
     const double share = std::min(there.share, shared_view(keyframe, old, motion.inverse()).share);
     if (share >= kMinShare) {
-      views.push_back({place, motion, share, there.magnification, roll});
+      views.push_back({place, motion, share, there.magnification});
     }
   }
   std::ranges::stable_sort(views, std::greater<>(), &ExpectedView::share);

@@ -81,15 +81,13 @@ struct ExpectedView {
   Similarity3 keyframe_from_place;
   double share = 0.0;          ///< of the landmarks of either one that the other one sees
   double magnification = 1.0;  ///< of the keyframe's view to the place's
-  double roll_rad = 0.0;       ///< of what the keyframe is described by against the place's
 };
 
-/// Picks the `places` that share enough of the view with a keyframe of the map, if it is at
-/// `map_from_keyframe` and described by the roll that `described_as`, a pose, has. The most first.
+/// Picks the `places` that share enough of the view with a keyframe that is at `map_from_keyframe`.
+/// The most first.
 [[nodiscard]] std::vector<ExpectedView> expected_views(const KeptMap& map,
                                                        std::span<const int> places,
                                                        const Similarity3& map_from_keyframe,
-                                                       const Eigen::Quaterniond& described_as,
                                                        const KeptKeyframe& keyframe);
 
 }  // namespace stemvo

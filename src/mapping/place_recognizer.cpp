@@ -153,7 +153,7 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
   }
   std::ranges::copy(expected_looks(question, described), std::back_inserter(looks));
   std::optional<Loop> found;
-  look_through(std::move(looks), [&](const Look& look) -> std::optional<std::vector<Look>> {
+  const auto look_for_loop = [&](const Look& look) -> std::optional<std::vector<Look>> {
     std::optional<Sighting> sighting = look_at(question, look);
     if (!sighting.has_value()) {
       return std::vector<Look>();
@@ -174,7 +174,8 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
     }
     sightings_.add(*sighting);
     return is_found ? std::nullopt : std::optional(looks_beside(question, *sighting, described));
-  });
+  };
+  look_through(std::move(looks), look_for_loop);
   return found;
 }
 
@@ -238,8 +239,7 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::expected_looks(const Questio
     }
   }
   std::vector<ExpectedView> views =
-      expected_views(question.map, places, question.map.pose(question.number),
-                     question.map.pose(question.number).rotation, question.keyframe);
+      expected_views(question.map, places, question.map.pose(question.number), question.keyframe);
   const auto num_alike = std::ranges::count_if(views, [](const ExpectedView& view) {
     return view.share >= kMinAlike && std::abs(std::log(view.magnification)) < kMaxLogAlike;
   });
@@ -247,7 +247,7 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::expected_looks(const Questio
   views.resize(std::min<std::size_t>(views.size(), kMaxCandidates));
   std::vector<Look> looks;
   for (const ExpectedView& view : views) {
-    looks.push_back({view.place, described.for_view(view.magnification, view.roll_rad),
+    looks.push_back({view.place, described.for_view(view.magnification, 0.0),
                      Expectation{view.keyframe_from_place}});
   }
   return looks;
@@ -273,12 +273,15 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::looks_beside(const Question&
       places.push_back(at);
     }
   }
-  std::vector<ExpectedView> views = expected_views(
-      map, places, map_from_keyframe, map.pose(question.number).rotation, question.keyframe);
+  std::vector<ExpectedView> views =
+      expected_views(map, places, map_from_keyframe, question.keyframe);
   views.resize(std::min<std::size_t>(views.size(), kMaxBeside));
+  // The keyframe is described by the axes of its own map.
+  const double roll_rad = image_roll_rad(map_from_keyframe.rotation) -
+                          image_roll_rad(map.pose(question.number).rotation);
   std::vector<Look> looks;
   for (const ExpectedView& view : views) {
-    looks.push_back({view.place, described.for_view(view.magnification, view.roll_rad),
+    looks.push_back({view.place, described.for_view(view.magnification, roll_rad),
                      Expectation{view.keyframe_from_place, Expectation::kBySighting_rad,
                                  sighting.is_by_poses && !question.is_elsewhere(loop.from)}});
   }
@@ -340,41 +343,39 @@ std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
   const std::vector<Similarity3> before = std::exchange(located_, {});
   LookDescriptors described(descriptors, describe_as);
   std::optional<LocatedFrame> located;
-  look_through(look_alikes(described, true, [](int) { return true; }),
-               [&](const Look& look) -> std::optional<std::vector<Look>> {
-                 std::vector<Look> others;
-                 const KeptKeyframe& old = keyframe_of(map, look.place);
-                 const auto found = locate_in_place(view_of(old), {camera, corners, look.seen});
-                 if (!found.has_value()) {
-                   return others;
-                 }
-                 const Similarity3 map_from_camera =
-                     map.pose(look.place) * Similarity3(found->old_from_camera);
-                 const auto is_near = [&](double max_turn_rad, double max_shift) {
-                   return [&, max_turn_rad, max_shift](const Similarity3& other) {
-                     const Similarity3 difference = map_from_camera.inverse() * other;
-                     return turn_of(difference) < max_turn_rad &&
-                            difference.translation.norm() < max_shift * median_depth(old.corners);
-                   };
-                 };
-                 const bool is_certain =
-                     std::ranges::any_of(located_, is_near(kMaxSameTurn_rad, kMaxSameShift)) ||
-                     std::ranges::any_of(before, is_near(kMaxMotion_rad, kMaxMotion));
-                 located_.push_back(map_from_camera);
-                 if (!is_certain) {
-                   for (const int neighbour : neighbours_of(look.place)) {
-                     others.push_back({neighbour, look.seen});
-                   }
-                   return others;
-                 }
-                 located = {look.place, found->old_from_camera, {}};
-                 for (const auto& [mine, other] : found->corners) {
-                   located->landmarks.emplace_back(
-                       corners[slot(other)].track_id,
-                       old.corners[slot(mine)].in_camera.cast<double>());
-                 }
-                 return std::nullopt;
-               });
+  const auto look_for_pose = [&](const Look& look) -> std::optional<std::vector<Look>> {
+    std::vector<Look> others;
+    const KeptKeyframe& old = keyframe_of(map, look.place);
+    const auto found = locate_in_place(view_of(old), {camera, corners, look.seen});
+    if (!found.has_value()) {
+      return others;
+    }
+    const Similarity3 map_from_camera = map.pose(look.place) * Similarity3(found->old_from_camera);
+    const auto is_near = [&](double max_turn_rad, double max_shift) {
+      return [&, max_turn_rad, max_shift](const Similarity3& other) {
+        const Similarity3 difference = map_from_camera.inverse() * other;
+        return turn_of(difference) < max_turn_rad &&
+               difference.translation.norm() < max_shift * median_depth(old.corners);
+      };
+    };
+    const bool is_certain =
+        std::ranges::any_of(located_, is_near(kMaxSameTurn_rad, kMaxSameShift)) ||
+        std::ranges::any_of(before, is_near(kMaxMotion_rad, kMaxMotion));
+    located_.push_back(map_from_camera);
+    if (!is_certain) {
+      for (const int neighbour : neighbours_of(look.place)) {
+        others.push_back({neighbour, look.seen});
+      }
+      return others;
+    }
+    located = {look.place, found->old_from_camera, {}};
+    for (const auto& [mine, other] : found->corners) {
+      located->landmarks.emplace_back(corners[slot(other)].track_id,
+                                      old.corners[slot(mine)].in_camera.cast<double>());
+    }
+    return std::nullopt;
+  };
+  look_through(look_alikes(described, true, [](int) { return true; }), look_for_pose);
   may_be_locating_ = !located && before.empty() && !located_.empty();
   return located;
 }

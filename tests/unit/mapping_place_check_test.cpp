@@ -122,6 +122,8 @@ TEST(PlaceCheck, WhatIsExpectedNeedsFewerCorners) {
   ASSERT_TRUE(loop.has_value());
   EXPECT_LT(turn_rad(loop->from_to, truth), 0.005);
   EXPECT_LT(std::abs(std::log(loop->from_to.scale / truth.scale)), 0.05);
+  const Expectation by_sighting{expected.inverse(), Expectation::kByPoses_rad, false};
+  EXPECT_FALSE(check_place(view_of(old), view_of(recent), by_sighting).has_value());
   DescribedPoints other = street(2);
   const KeptKeyframe elsewhere = other.see(kNewPose, kNewUnits, 100000);
   EXPECT_FALSE(
