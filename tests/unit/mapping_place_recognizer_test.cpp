@@ -145,25 +145,38 @@ TEST(PlaceRecognizer, APlaceIsExpectedWhereTheCameraCameBack) {
 }
 
 /// Corners look so different that they are known only where they are looked for: the one view that
-/// shows the place tells where.
+/// shows the place tells where, unless the camera is lost behind it.
 TEST(PlaceRecognizer, ASightingTellsWhereTheNextOnesLie) {
-  constexpr double kHardlyAlike = 0.22;
-  for (const bool has_one_clear_view : {false, true}) {
+  struct Case {
+    bool has_clear_view;
+    int component_behind;
+    bool is_joined;
+  };
+  for (const Case& one : {Case{false, 1, false}, Case{true, 1, true}, Case{true, 2, false}}) {
     TwoRounds drive(3);
     drive.first_round();
-    drive.component = 1;
     drive.axes_rolled_rad = 0.3;  // no look that votes is turned like that
     int num_joined = 0;
     for (int i = 20; i < 30; ++i) {
-      drive.bits_changed = has_one_clear_view && i == 20 ? 0.0 : kHardlyAlike;
+      drive.component = i == 20 ? 1 : one.component_behind;
+      drive.bits_changed = one.has_clear_view && i == 20 ? 0.0 : 0.22;
       const auto loop = drive.add(drive.points, drive.aside(i), kUnits);
       if (loop.has_value()) {
         ++num_joined;
         EXPECT_NEAR(loop->from_to.scale, 1.0 / kUnits, 0.02);
       }
     }
-    EXPECT_EQ(num_joined > 0, has_one_clear_view);
+    EXPECT_EQ(num_joined > 0, one.is_joined);
   }
+}
+
+TEST(PlaceRecognizer, ThreeKeyframesJoinTwoMaps) {
+  TwoRounds drive(3);
+  drive.first_round();
+  drive.component = 1;
+  EXPECT_FALSE(drive.add(drive.points, drive.aside(20), kUnits).has_value());
+  EXPECT_FALSE(drive.add(drive.points, drive.aside(21), kUnits).has_value());
+  EXPECT_TRUE(drive.add(drive.points, drive.aside(22), kUnits).has_value());
 }
 
 TEST(PlaceRecognizer, OneSightingIsNotBelieved) {
