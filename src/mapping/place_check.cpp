@@ -266,6 +266,33 @@ double median_error_px(const Similarity3& recent_from_old,
 
 }  // namespace
 
+std::optional<Expectation> expect_by_places(const Camera& camera,
+                                            std::span<const PlaceAround> around,
+                                            const PlaceView& recent) {
+  std::vector<KeptCorner> landmarks;
+  std::vector<DescriptorPair> pairs;
+  // Each is matched alone: where two show one landmark, neither would be clearly the nearest.
+  for (const auto& [place_from_it, view] : around) {
+    for (const auto& [mine, other] : match_descriptors(view.descriptors, recent.descriptors)) {
+      const Eigen::Vector3d landmark = place_from_it * landmark_of(view, mine);
+      if (landmark.z() > 0.0) {  // not NaN, which stands for none
+        pairs.emplace_back(static_cast<int>(landmarks.size()), other);
+        landmarks.push_back({-1, camera.project(landmark).cast<float>(), landmark.cast<float>()});
+      }
+    }
+  }
+  const PlaceView all{camera, landmarks, {}};
+  const auto found = find_consensus(all, recent, pairs);
+  const auto scale = found.has_value() ? scale_between(all, recent, *found) : std::nullopt;
+  if (!scale.has_value()) {
+    return std::nullopt;
+  }
+  const Rigid3 place_from_recent = found->by_from_of.inverse();
+  return Expectation{
+      Similarity3(*scale, place_from_recent.rotation, place_from_recent.translation).inverse(),
+      Expectation::kBySighting_rad, false};
+}
+
 std::optional<PlacePose> locate_in_place(const PlaceView& old, const PlaceView& frame) {
   auto found = find_consensus(old, frame, match_descriptors(old.descriptors, frame.descriptors));
   if (!found.has_value()) {

@@ -46,6 +46,18 @@ struct Expectation {
   bool is_certain = true;            ///< poses say that they show one place: fewer are enough
 };
 
+/// An old keyframe beside a place.
+struct PlaceAround {
+  Similarity3 place_from_it;
+  PlaceView view;
+};
+
+/// Where a new keyframe lies to a place, whose camera is given, by the landmarks of all that stand
+/// around it, itself too: each alone may have too few that look alike. nullopt: too few agree.
+[[nodiscard]] std::optional<Expectation> expect_by_places(const Camera& camera,
+                                                          std::span<const PlaceAround> around,
+                                                          const PlaceView& recent);
+
 /// The similarity between two keyframes that see the same landmarks, each with its own idea of
 /// where they are: `old` on the new one's, the new one on the old ones, both agreeing, then one
 /// similarity refined on both images. The result's `from` and `to` are not set. nullopt: the two do

@@ -37,6 +37,8 @@ constexpr int kMaxCandidates = 3;
 /// So many sightings of the lookups before tell where to look, each at so many places.
 constexpr std::ptrdiff_t kMaxSightings = 3;
 constexpr std::size_t kMaxBeside = 4;
+/// So many places before and behind one are those around it.
+constexpr std::ptrdiff_t kPlacesAround = 2;
 /// Bounds of the motion between a frame and one just before, both without a pose: rad, share of the
 /// depth.
 constexpr double kMaxMotion_rad = 0.3;
@@ -288,6 +290,20 @@ std::vector<PlaceRecognizer::Look> PlaceRecognizer::looks_beside(const Question&
   return looks;
 }
 
+std::optional<Expectation> PlaceRecognizer::look_around(const Question& question,
+                                                        int place,
+                                                        const PlaceView& recent) const {
+  const KeptMap& map = question.map;
+  std::vector<PlaceAround> around;
+  for (const Place& one : places_around(place, kPlacesAround)) {
+    if (question.components[slot(one.keyframe)] == question.components[slot(place)]) {
+      around.push_back({map.pose(place).inverse() * map.pose(one.keyframe),
+                        view_of(keyframe_of(map, one.keyframe))});
+    }
+  }
+  return expect_by_places(keyframe_of(map, place).camera, around, recent);
+}
+
 std::optional<Sighting> PlaceRecognizer::look_at(const Question& question, const Look& look) const {
   const auto& [map, components, number, keyframe] = question;
   const KeptKeyframe& old = keyframe_of(map, look.place);
@@ -295,8 +311,13 @@ std::optional<Sighting> PlaceRecognizer::look_at(const Question& question, const
                                         !has_come_back(map, place_of(look.place), number))) {
     return std::nullopt;
   }
-  std::optional<Loop> loop =
-      check_place(view_of(old), {keyframe.camera, keyframe.corners, look.seen}, look.expected);
+  const PlaceView recent{keyframe.camera, keyframe.corners, look.seen};
+  std::optional<Loop> loop = check_place(view_of(old), recent, look.expected);
+  if (!loop.has_value() && !look.expected.has_value() && question.is_elsewhere(look.place)) {
+    if (const auto expected = look_around(question, look.place, recent)) {
+      loop = check_place(view_of(old), recent, expected);
+    }
+  }
   if (!loop.has_value()) {
     return std::nullopt;
   }
@@ -317,16 +338,10 @@ bool PlaceRecognizer::has_come_back(const KeptMap& map, const Place& place, int 
   return place.depth > 0.0 && change_of_view(net, place.depth) < kMaxNetWay * (path_ - place.path);
 }
 
-std::vector<int> PlaceRecognizer::neighbours_of(int place) const {
+std::span<const PlaceRecognizer::Place> PlaceRecognizer::places_around(int place,
+                                                                       std::ptrdiff_t num) const {
   const auto at = std::ranges::lower_bound(places_, place, {}, &Place::keyframe);
-  std::vector<int> neighbours;
-  if (at != places_.begin()) {
-    neighbours.push_back(std::prev(at)->keyframe);
-  }
-  if (at != places_.end() && std::next(at) != places_.end()) {
-    neighbours.push_back(std::next(at)->keyframe);
-  }
-  return neighbours;
+  return {at - std::min(num, at - places_.begin()), at + std::min(num + 1, places_.end() - at)};
 }
 
 void PlaceRecognizer::add(int number, const KeptKeyframe& keyframe) {
@@ -363,8 +378,8 @@ std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
         std::ranges::any_of(before, is_near(kMaxMotion_rad, kMaxMotion));
     located_.push_back(map_from_camera);
     if (!is_certain) {
-      for (const int neighbour : neighbours_of(look.place)) {
-        others.push_back({neighbour, look.seen});
+      for (const Place& neighbour : places_around(look.place, 1)) {
+        others.push_back({neighbour.keyframe, look.seen});
       }
       return others;
     }

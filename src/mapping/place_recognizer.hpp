@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <span>
@@ -122,12 +123,16 @@ class PlaceRecognizer {
   [[nodiscard]] bool is_far(const Question& question, int place) const {
     return place < end_of_far() || question.is_elsewhere(place);
   }
+  /// Where a keyframe lies to a place of another map, by the landmarks of those around it, too.
+  [[nodiscard]] std::optional<Expectation> look_around(const Question& question,
+                                                       int place,
+                                                       const PlaceView& recent) const;
   [[nodiscard]] std::optional<Sighting> look_at(const Question& question, const Look& look) const;
   [[nodiscard]] bool has_come_back(const KeptMap& map, const Place& place, int number) const;
   /// Keyframes below this number are far enough before the present one.
   [[nodiscard]] int end_of_far() const;
-  /// Places just before and behind a place.
-  [[nodiscard]] std::vector<int> neighbours_of(int place) const;
+  /// A place, and so many just before and behind it.
+  [[nodiscard]] std::span<const Place> places_around(int place, std::ptrdiff_t num) const;
 
   PlaceIndex index_;
   std::vector<Place> places_;
