@@ -15,6 +15,7 @@ struct SceneOptions {
   double noise_px = 0.0;       ///< standard deviation, per coordinate, in both images
   double outlier_ratio = 0.0;  ///< share of matches whose point in cur is anywhere
   bool planar = false;
+  Camera camera = kitti_camera();
   std::uint64_t seed = 1;
   double min_depth = 4.0;  ///< in units of the motion's translation (length 1 if random)
   double max_depth = 20.0;
@@ -92,6 +93,7 @@ inline void add_match(const SceneOptions& options,
 inline Scene make_scene(const SceneOptions& options) {
   SceneRandom random(options.seed);
   Scene scene;
+  scene.camera = options.camera;
   scene.cur_from_prev = options.cur_from_prev.value_or(random.motion(options.max_rotation_rad));
   if (options.planar) {
     // Tilted by up to 45 degrees against the image plane.

@@ -26,15 +26,6 @@ Correspondences seen_from(const DriveTracks& drive, std::size_t frame) {
 
 const Rigid3 kPush(so3_exp({0.01, -0.02, 0.01}), {0.3, -0.2, 0.5});
 
-TEST(AbsolutePose, ExactDataAreReproduced) {
-  const DriveTracks drive(4, 0.0, 1);
-  const Correspondences seen = seen_from(drive, 3);
-  const Rigid3 truth = drive.world_from_camera[3].inverse();
-  const Rigid3 pose = refine_absolute_pose(kPush * truth, seen.points, seen.uv, drive.camera);
-  EXPECT_LE(pose.rotation.angularDistance(truth.rotation), 1e-8);
-  EXPECT_LE((pose.translation - truth.translation).norm(), 1e-7);
-}
-
 TEST(AbsolutePose, AThirdOfWrongPointsDoesNotPull) {
   const DriveTracks drive(4, 0.2, 2);
   Correspondences seen = seen_from(drive, 3);
@@ -46,12 +37,6 @@ TEST(AbsolutePose, AThirdOfWrongPointsDoesNotPull) {
   const Rigid3 pose = refine_absolute_pose(kPush * truth, seen.points, seen.uv, drive.camera);
   EXPECT_LE(pose.rotation.angularDistance(truth.rotation), 5e-4);
   EXPECT_LE((pose.translation - truth.translation).norm(), 0.02);
-}
-
-TEST(AbsolutePose, TooFewPointsGiveTheStartBack) {
-  const DriveTracks drive(2, 0.0, 3);
-  const Rigid3 pose = refine_absolute_pose(kPush, {}, {}, drive.camera);
-  EXPECT_EQ(pose.translation, kPush.translation);
 }
 
 constexpr double kLoss_px = 0.3;
@@ -108,13 +93,6 @@ TEST(PoseInfluence, OfAPointIsWhatThePoseIsWithoutIt) {
   Vector6d expected;
   expected << change.translation, so3_log(change.rotation);
   EXPECT_LT((influence - expected).norm(), 0.2 * expected.norm());
-}
-
-TEST(PoseInfluence, NothingSeenGivesAFiniteCovariance) {
-  const PoseInfluences none = pose_influences({}, {}, {}, kitti_camera(), kLoss_px);
-  EXPECT_TRUE(none.covariance.allFinite());
-  EXPECT_EQ(none.covariance.llt().info(), Eigen::Success);
-  EXPECT_EQ(none.squared_sum(), Matrix6d::Zero());
 }
 
 TEST(PoseInfluence, TwoViewsSayHowSureTheirMotionIs) {
