@@ -4,7 +4,6 @@
 #include "features/patch_alignment.hpp"
 #include "instruction_set.hpp"
 #include "stemvo/options.hpp"
-#include "support/plain_samples.hpp"
 #include "support/planted_warps.hpp"
 #include "support/test.hpp"
 
@@ -104,35 +103,17 @@ struct Case {
   double found;
 };
 
-void hold(const Case& one) {
-  SCOPED_TRACE(one.name);
-  const PlantedPoints points(one.view);
-  const Distances errors = errors_of_patches(points);
-  std::cout << "| " << one.name << " | " << errors.row() << " | "
-            << errors_of_lucas_kanade(points).row() << " |\n";
-  EXPECT_LE(errors.quantile_px(0.5), one.median_px);
-  EXPECT_LE(errors.quantile_px(0.9), one.p90_px);
-  EXPECT_GE(errors.found(), one.found);
-}
-
-TEST(PatchAlignment, ErrorsOfPlantedWarpsAreAFiftiethOfAPixel) {
+/// Noise is in gray values; it and the blur are of the second image only.
+TEST(PatchAlignment, ErrorsOfPlantedWarps) {
+  constexpr float kX = 1.3F;
+  constexpr float kY = -0.4F;
+  const Similarity shifted{kX, kY};
   for (const Case& one : std::vector<Case>{
            {"no warp", {}, 0.001, 0.002, 1.0},
            {"3.37, -2.81 px", {{3.37F, -2.81F}}, 0.02, 0.025, 1.0},
            {"1.25, -2.25 px", {{1.25F, -2.25F}}, 0.02, 0.025, 1.0},
            {"scale 1.06", {{-8.0F, 5.5F, 1.06F, 0.0F}}, 0.02, 0.025, 1.0},
            {"scale 0.99, turn 0.03", {{4.2F, -6.0F, 0.99F, 0.03F}}, 0.02, 0.025, 1.0},
-       }) {
-    hold(one);
-  }
-}
-
-/// Noise is in gray values; it and the blur are of the second image only.
-TEST(PatchAlignment, ErrorsOverNoiseBlurAndScale) {
-  constexpr float kX = 1.3F;
-  constexpr float kY = -0.4F;
-  const Similarity shifted{kX, kY};
-  for (const Case& one : std::vector<Case>{
            {"noise 2", {shifted, 1.0, 0.0, 2.0}, 0.045, 0.08, 0.99},
            {"noise 5", {shifted, 1.0, 0.0, 5.0}, 0.105, 0.21, 0.99},
            {"noise 10", {shifted, 1.0, 0.0, 10.0}, 0.21, 0.41, 0.97},
@@ -149,7 +130,14 @@ TEST(PatchAlignment, ErrorsOverNoiseBlurAndScale) {
             0.39,
             0.97},
        }) {
-    hold(one);
+    SCOPED_TRACE(one.name);
+    const PlantedPoints points(one.view);
+    const Distances errors = errors_of_patches(points);
+    std::cout << "| " << one.name << " | " << errors.row() << " | "
+              << errors_of_lucas_kanade(points).row() << " |\n";
+    EXPECT_LE(errors.quantile_px(0.5), one.median_px);
+    EXPECT_LE(errors.quantile_px(0.9), one.p90_px);
+    EXPECT_GE(errors.found(), one.found);
   }
 }
 
@@ -173,7 +161,7 @@ TEST(PatchAlignment, APlainSurfaceIsNotCut) {
   EXPECT_FALSE(cut_patch(plain.levels, 100.0F, 100.0F, patch));
 }
 
-/// Without it the tests below would run the same code twice: `unit.portable` sets STEMVO_PORTABLE.
+/// Without it `unit.portable`, which sets STEMVO_PORTABLE, would run the same code once more.
 TEST(InstructionSet, IsThePortableOneWhereThatIsAskedFor) {
   const char* value = std::getenv("STEMVO_PORTABLE");
   if (value != nullptr && std::string_view(value) == "1") {
@@ -183,59 +171,6 @@ TEST(InstructionSet, IsThePortableOneWhereThatIsAskedFor) {
 #if defined(__x86_64__)
   EXPECT_EQ(uses_avx2(), __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"));
 #endif
-}
-
-class PatchKernelsTest : public ::testing::Test {
- protected:
-  const TestPyramid pyramid_{View().render()};
-  const BorderedImage& image_ = pyramid_.levels.front();
-  const PatchKernels& kernels_ = patch_kernels();
-};
-
-TEST_F(PatchKernelsTest, SamplesAreThoseOfTheFormula) {
-  for (const Similarity& warp : {Similarity{60.3F, 70.8F, 1.1F, 0.2F},
-                                 {0.0F, 0.0F, 1.0F, 0.0F},
-                                 {60.3F, 70.9F, 1.0F, 0.0F},
-                                 {319.0F, 239.0F, 0.8F, -0.3F}}) {
-    FineValues values;
-    kernels_.sample_fine(image_, warp, values);
-    const Eigen::VectorXd expected =
-        samples(image_, Complex(warp.x, warp.y), Complex(warp.a, warp.b), cubic_weight);
-    for (Eigen::Index k = 0; k < expected.size(); ++k) {
-      EXPECT_NEAR(values[static_cast<std::size_t>(k)], expected[k], 0.02);
-    }
-  }
-  CoarseValues coarse;
-  kernels_.sample_coarse(image_, 20.25F, 30.75F, coarse);
-  const Eigen::VectorXd expected = samples(image_, {23.75, 34.25}, 1.0, linear_weight);
-  for (Eigen::Index k = 0; k < expected.size(); ++k) {
-    EXPECT_NEAR(coarse[static_cast<std::size_t>(k)], expected[k], 1e-3);
-  }
-}
-
-TEST_F(PatchKernelsTest, SumsAreThoseOfTheirSamples) {
-  CoarseValues coarse;
-  kernels_.sample_coarse(image_, 20.25F, 30.75F, coarse);
-  const double sum = std::accumulate(coarse.begin(), coarse.end(), 0.0);
-  const double squares = std::inner_product(coarse.begin(), coarse.end(), coarse.begin(), 0.0);
-  float sums[2];
-  CoarsePatch patch{{}, {}, coarse};
-  patch.gx.fill(1.0F);
-  kernels_.coarse_sums(image_, 20.25F, 30.75F, patch, sums);
-  EXPECT_NEAR(sums[0], sum, 1e-5 * sum);
-  EXPECT_NEAR(sums[1], squares, 1e-5 * squares);
-  FineColumns columns{};
-  columns[2] = coarse;
-  FineValues ramp;
-  std::iota(ramp.begin(), ramp.end(), 0.0F);
-  float fine[7];
-  kernels_.fine_sums(coarse, columns, ramp, fine);
-  EXPECT_EQ(fine[0], 0.0F);
-  EXPECT_NEAR(fine[2], squares, 1e-5 * squares);
-  EXPECT_NEAR(fine[4], sum, 1e-5 * sum);
-  EXPECT_NEAR(fine[5], squares, 1e-5 * squares);
-  const double product = std::inner_product(coarse.begin(), coarse.end(), ramp.begin(), 0.0);
-  EXPECT_NEAR(fine[6], product, 1e-5 * product);
 }
 
 }  // namespace

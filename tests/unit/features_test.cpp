@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "features/front_end.hpp"
+#include "geometry/median.hpp"
 #include "support/test.hpp"
 
 namespace stemvo {
@@ -28,8 +29,7 @@ double median_error_px(const Matches& matches, const Eigen::Vector2d& expected_f
   for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
     errors.push_back((matches.cur_uv[i] - matches.prev_uv[i] - expected_flow).norm());
   }
-  std::sort(errors.begin(), errors.end());
-  return errors.empty() ? 1e9 : errors[errors.size() / 2];
+  return errors.empty() ? 1e9 : median(errors);
 }
 
 class FrontEndTest : public ::testing::TestWithParam<FeatureMethod> {
@@ -118,6 +118,15 @@ INSTANTIATE_TEST_SUITE_P(Methods,
                                            FeatureMethod::kOrb,
                                            FeatureMethod::kSift));
 
+/// Where the matches of this track start; nullopt: it is none of them.
+std::optional<Eigen::Vector2d> start_of(const Matches& matches, int track_id) {
+  const auto found = std::ranges::find(matches.track_ids, track_id);
+  return found == matches.track_ids.end()
+             ? std::nullopt
+             : std::optional(
+                   matches.prev_uv[static_cast<std::size_t>(found - matches.track_ids.begin())]);
+}
+
 TEST(PatchFrontEnd, FollowsTheSamePointsUnderOneIdAndForgetsRejectedOnes) {
   const auto front_end = create_front_end({});
   const cv::Size size(480, 200);
@@ -130,29 +139,15 @@ TEST(PatchFrontEnd, FollowsTheSamePointsUnderOneIdAndForgetsRejectedOnes) {
   is_good[3] = 0;
   front_end->remove_outliers(is_good);
   const Matches second = front_end->process(image_of(textured_image(size, {2.0, 0.0})));
-  std::map<int, Eigen::Vector2d> second_prev;
-  for (std::size_t i = 0; i < second.track_ids.size(); ++i) {
-    second_prev[second.track_ids[i]] = second.prev_uv[i];
-  }
-  EXPECT_EQ(second_prev.count(first.track_ids[3]), 0U);
+  EXPECT_FALSE(start_of(second, first.track_ids[3]).has_value());
   int num_continued = 0;
   for (std::size_t i = 0; i < first.track_ids.size(); ++i) {
-    const auto found = second_prev.find(first.track_ids[i]);
-    if (found != second_prev.end()) {
+    if (const auto start = start_of(second, first.track_ids[i])) {
       ++num_continued;
-      EXPECT_LT((found->second - first.cur_uv[i]).norm(), 1e-6);
+      EXPECT_LT((*start - first.cur_uv[i]).norm(), 1e-6);
     }
   }
   EXPECT_GT(num_continued, static_cast<int>(first.track_ids.size()) / 2);
-}
-
-/// Where the matches of this track start; nullopt: it is none of them.
-std::optional<Eigen::Vector2d> start_of(const Matches& matches, int track_id) {
-  const auto found = std::ranges::find(matches.track_ids, track_id);
-  return found == matches.track_ids.end()
-             ? std::nullopt
-             : std::optional(
-                   matches.prev_uv[static_cast<std::size_t>(found - matches.track_ids.begin())]);
 }
 
 TEST(PatchFrontEnd, ATrackThatEndedIsFoundAgainWhereItIsExpectedOrForgotten) {
@@ -233,9 +228,7 @@ cv::Mat wide_texture(int shift_px) {
 }
 
 TEST(PatchFrontEnd, FindsAMotionBeyondTheLevelsAskedForOneLevelUp) {
-  FeatureOptions options;
-  options.klt_levels = 3;
-  const auto front_end = create_front_end(options);
+  const auto front_end = create_front_end({.klt_levels = 3});
   static_cast<void>(front_end->process(image_of(wide_texture(0))));
   const Matches far = front_end->process(image_of(wide_texture(60)));
   EXPECT_GT(far.cur_uv.size(), 100U);
@@ -244,9 +237,7 @@ TEST(PatchFrontEnd, FindsAMotionBeyondTheLevelsAskedForOneLevelUp) {
 
 TEST(PatchFrontEnd, LooksAsFarOnAsTheIntervalIsLong) {
   const auto found_after_s = [](double interval_s) {
-    FeatureOptions options;
-    options.klt_levels = 3;
-    const auto front_end = create_front_end(options);
+    const auto front_end = create_front_end({.klt_levels = 3});
     for (int i = 0; i < 3; ++i) {
       static_cast<void>(front_end->process(image_of(wide_texture(30 * i)), {i, 0.1 * i}));
     }
@@ -260,9 +251,7 @@ TEST(PatchFrontEnd, LooksAsFarOnAsTheIntervalIsLong) {
 
 TEST(PatchFrontEnd, LooksWhereTheTurnLeadsUnlessItLeadsNowhere) {
   const auto found_by = [](const std::optional<double>& last_shift_px) {
-    FeatureOptions options;
-    options.klt_levels = 3;
-    const auto front_end = create_front_end(options);
+    const auto front_end = create_front_end({.klt_levels = 3});
     const auto show = [&](int shift_px, const std::optional<double>& turn_px) {
       ImageClue clue;
       if (turn_px) {
