@@ -18,13 +18,6 @@ inline Options config_without_scale(OdometryMode mode = OdometryMode::kMap) {
   return config;
 }
 
-/// Both halves of a frame.
-inline FrameResult add_frame(Estimator& estimator, const Frame& frame) {
-  LocalizedFrame localized = estimator.localize(frame);
-  estimator.optimize(frame, localized);
-  return localized.result;
-}
-
 /// Feeds an estimator with a drive's tracks, as a front end does: a track that it rejects ends, and
 /// its point is found again under another number.
 class EstimatorRun {
@@ -47,10 +40,7 @@ class EstimatorRun {
   void add_all() { add_range(0, drive_.num_frames()); }
   /// A frame with these matches in place of the drive's own.
   FrameResult add_matches(Matches matches, int i) {
-    Frame frame;
-    frame.number = static_cast<int>(results.size());
-    frame.time_s = next_time_s();
-    frame.hints = std::exchange(hints, {});
+    Frame frame = next_frame();
     frame.image = image;
     frame.road = road ? road(i) : nullptr;
     frame.pyramid = pyramid ? pyramid(i) : nullptr;
@@ -73,21 +63,16 @@ class EstimatorRun {
     return results.back();
   }
   FrameResult add_missing() {
-    Frame frame;
-    frame.number = static_cast<int>(results.size());
-    frame.time_s = next_time_s();
-    frame.hints = std::exchange(hints, {});
-    results.push_back(add_frame(estimator_, frame));
+    const Frame frame = next_frame();
+    LocalizedFrame localized = estimator_.localize(frame);
+    estimator_.optimize(frame, localized);
+    results.push_back(localized.result);
     return results.back();
   }
 
   [[nodiscard]] FrameState state(int i) const { return results[static_cast<std::size_t>(i)].state; }
   [[nodiscard]] int count(FrameState state) const {
-    int number = 0;
-    for (const FrameResult& result : results) {
-      number += result.state == state ? 1 : 0;
-    }
-    return number;
+    return static_cast<int>(std::ranges::count(results, state, &FrameResult::state));
   }
 
   double interval_s = 0.1;                                    ///< before the next frame
@@ -102,7 +87,13 @@ class EstimatorRun {
  private:
   static constexpr int kManyTracks = 1000000;
 
-  double next_time_s() { return time_s_ += interval_s; }
+  Frame next_frame() {
+    Frame frame;
+    frame.number = static_cast<int>(results.size());
+    frame.time_s = time_s_ += interval_s;
+    frame.hints = std::exchange(hints, {});
+    return frame;
+  }
 
   Estimator& estimator_;
   const DriveTracks& drive_;

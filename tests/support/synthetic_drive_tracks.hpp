@@ -72,13 +72,6 @@ class DriveTracks {
   [[nodiscard]] const Rigid3& pose(int i) const {
     return world_from_camera[static_cast<std::size_t>(i)];
   }
-  [[nodiscard]] double length_m() const {
-    double sum = 0.0;
-    for (int i = 1; i < num_frames(); ++i) {
-      sum += (pose(i).translation - pose(i - 1).translation).norm();
-    }
-    return sum;
-  }
 
   /// Matches of frame i - 1 to frame i under the points' numbers.
   [[nodiscard]] Matches matches(int i) const { return matches(i - 1, i); }

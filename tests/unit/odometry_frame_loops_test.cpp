@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <latch>
 #include <mutex>
-#include <new>
 
 #include "odometry/odometry_loops.hpp"
 #include "support/test.hpp"
@@ -22,7 +21,7 @@ class Notes {
     return {.prepare = [this](std::size_t k) { note(kPrepare, k); },
             .track = [this](std::size_t k) { note(kTrack, k); },
             .localize = [this](std::size_t k) { note(kLocalize, k); },
-            .optimize = [this](std::size_t k) { return note(kOptimize, k) && k != stop_at; }};
+            .optimize = [this](std::size_t k) { return note(kOptimize, k); }};
   }
   void fill(std::size_t k) { note(kFill, k); }
   [[nodiscard]] int begin(Stage stage, std::size_t k) const { return spans_.at({stage, k}).first; }
@@ -32,8 +31,6 @@ class Notes {
         std::ranges::count_if(spans_, [&](const auto& span) { return span.first.first == stage; }));
   }
   [[nodiscard]] const std::set<std::thread::id>& threads() const { return threads_; }
-
-  std::size_t stop_at = 1000000;
 
  private:
   bool note(Stage stage, std::size_t k) {
@@ -101,13 +98,6 @@ TEST(FrameLoops, KeepTheOrderWhateverAStageTakes) {
   }
 }
 
-TEST(FrameLoops, WithOneThreadAllRunsInTheCallingOne) {
-  Notes notes;
-  run(notes, 5, 1);
-  EXPECT_EQ(notes.threads(), std::set{std::this_thread::get_id()});
-  EXPECT_LT(notes.end(kOptimize, 0), notes.begin(kFill, 1));
-}
-
 /// Each of the three waits for the others: without all three at a time the test would not end.
 TEST(FrameLoops, TheThreeLoopsRunBesideEachOther) {
   std::latch all(3);
@@ -120,30 +110,6 @@ TEST(FrameLoops, TheThreeLoopsRunBesideEachOther) {
   run(notes, 6, 2);
   EXPECT_EQ(notes.threads().size(), 4U);  // this one fills
   EXPECT_EQ(notes.count(kOptimize), 6U);
-}
-
-TEST(FrameLoops, WaitForAllThatWerePushedAndGoOn) {
-  for (const int num_threads : {1, 2}) {
-    Notes notes(nap);
-    FrameLoops loops(notes.stages(), num_threads);
-    EXPECT_TRUE(loops.wait_for_all());
-    for (const std::size_t num_done : {1U, 4U, 13U}) {
-      push(loops, notes, num_done - notes.count(kFill));
-      EXPECT_TRUE(loops.wait_for_all());
-      EXPECT_EQ(notes.count(kOptimize), num_done);
-    }
-    loops.finish();
-    EXPECT_FALSE(loops.push([](std::size_t) { ADD_FAILURE(); }));
-  }
-}
-
-TEST(FrameLoops, EndBehindTheFrameWhoseOptimizationSaysSo) {
-  for (const int num_threads : {1, 2}) {
-    Notes notes(nap);
-    notes.stop_at = 7;
-    run(notes, 100, num_threads);
-    EXPECT_EQ(notes.count(kOptimize), 8U);
-  }
 }
 
 TEST(FrameLoops, ThrowAgainWhatAStageThrows) {
@@ -168,26 +134,6 @@ TEST(FrameLoops, ThrowAgainWhatAStageThrows) {
       }
       EXPECT_LE(notes.count(kOptimize), frame + 1U);
     }
-  }
-}
-
-TEST(FrameLoops, AFrameThatCannotBeFilledWasNeverThere) {
-  for (const int num_threads : {1, 2}) {
-    Notes notes(nap);
-    FrameLoops loops(notes.stages(), num_threads);
-    push(loops, notes, 3);
-    EXPECT_THROW((void)loops.push([](std::size_t) { throw std::bad_alloc(); }), std::bad_alloc);
-    push(loops, notes, 3);
-    loops.finish();
-    EXPECT_EQ(notes.count(kOptimize), 6U);
-  }
-}
-
-TEST(FrameLoops, DropFramesBegunWhenTheyAreDestroyed) {
-  for (std::size_t num_frames = 0; num_frames < 10; ++num_frames) {
-    Notes notes(nap);
-    FrameLoops loops(notes.stages(), 2);
-    push(loops, notes, num_frames);
   }
 }
 

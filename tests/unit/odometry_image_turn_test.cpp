@@ -119,15 +119,6 @@ TEST(ImageTurn, LooksPastTheMask) {
   EXPECT_FALSE(unmasked.has_value() && unmasked->angularDistance(turn) < 0.05);
 }
 
-TEST(ImageTurn, TheSameImageTwiceDidNotTurn) {
-  ImageTurn aligner(kCamera);
-  const ImagePyramid image = Surroundings(5).seen(Eigen::Quaterniond::Identity());
-  EXPECT_FALSE(aligner.align(image, 0.1, {}).has_value());
-  const auto found = aligner.align(image, 0.1, {});
-  ASSERT_TRUE(found.has_value());
-  EXPECT_LT(found->angularDistance(Eigen::Quaterniond::Identity()), 1e-9);
-}
-
 TEST(ImageTurn, PlainImagesAndOtherScenesTellNone) {
   ImageTurn aligner(kCamera);
   const ImagePyramid plain({cv::Mat(240, 320, CV_8U, cv::Scalar(90)), {}});

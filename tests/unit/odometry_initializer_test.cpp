@@ -104,18 +104,6 @@ TEST(Initializer, MatchesThatAgreeOnNothingAreLost) {
   EXPECT_EQ(initializer.measure({}, {}, walk.camera).state, FrameState::kLost);
 }
 
-TEST(Initializer, AReferenceIsWornOutOnceItsTracksHaveEnded) {
-  const DriveTracks walk = sideways_walk(0.0, 10);
-  Initializer initializer(Options{});
-  Observations points = view_of(walk.matches(0, 1), Rigid3(), 1).points;
-  initializer.start({0, Rigid3(), points});
-  EXPECT_FALSE(initializer.lost_reference(points));
-  points.resize(points.size() * 6 / 10);
-  EXPECT_FALSE(initializer.lost_reference(points));
-  points.resize(points.size() / 4);
-  EXPECT_TRUE(initializer.lost_reference(points));
-}
-
 TEST(Initializer, TheMaskIsOfAllMatchesAndKeepsThoseTheReferenceDoesNotSee) {
   const DriveTracks walk = sideways_walk(0.05, 11);
   Initializer initializer(Options{});

@@ -69,14 +69,6 @@ TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
   EXPECT_GT((wrong.world_from_camera().translation - truth.translation).norm(), 0.1);
 }
 
-TEST(MotionChain, WithoutAScaleAStepIsOneUnitWhateverTheMetresAre) {
-  ScaleOptions scale{.source = ScaleSource::kNone, .step_m = 0.7};
-  Chain chain({}, scale);
-  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
-  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
-  EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
-}
-
 TEST(MotionChain, InitializesUntilAMotionIsDecisive) {
   Chain chain = make_chain();
   MeasuredMotion doubtful = driven(Eigen::Vector3d::UnitZ(), 0.0);
@@ -173,14 +165,6 @@ TEST(PairEstimator, EveryMeasuredStepIsOneUnitAndPosesStayAsTheyCame) {
     EXPECT_EQ(poses[i].translation, d.run.results[i].world_from_camera.translation);
   }
   EXPECT_TRUE(d.estimator.landmarks_since(0).landmarks.empty());
-}
-
-TEST(PairEstimator, MissingImagesBeforeTheFirstOneAreNoStart) {
-  Driven d;
-  EXPECT_EQ(d.run.add_missing().state, FrameState::kNoImage);
-  EXPECT_EQ(d.run.add(0).state, FrameState::kFirst);
-  EXPECT_EQ(d.run.add(1).state, FrameState::kInitializing);
-  EXPECT_EQ(d.run.add(2).state, FrameState::kTracking);
 }
 
 TEST(PairEstimator, StationaryAndTurningHoldThePosition) {

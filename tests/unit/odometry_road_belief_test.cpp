@@ -69,15 +69,6 @@ TEST(RoadBelief, EachContradictionKeepsARoadFromBeingBelieved) {
   }
 }
 
-TEST(RoadBelief, SaysWhatSpeaksAgainstTheRoad) {
-  RoadBelief belief;
-  EXPECT_EQ(belief.doubt(), "no road is proven yet");
-  RoadEvidence frame = good_frame();
-  frame.num_below = 40;
-  belief.add(frame);
-  EXPECT_EQ(belief.doubt(), "landmarks are not on it");
-}
-
 TEST(RoadBelief, UnmeasuredFramesProveNothingAndTakeNothingAway) {
   RoadEvidence nothing;
   nothing.is_in_sight = true;

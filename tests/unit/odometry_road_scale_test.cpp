@@ -25,37 +25,6 @@ TEST(RoadRegion, FollowsTheTurn) {
   EXPECT_FALSE(region.contains(region.on_ground({0.0, -0.1})));
 }
 
-TEST(RoadPath, TellsSlopeAndBendOfTheRoadWhateverTheCamerasPitch) {
-  RoadOptions options{.heave_sigma_m = 0.01};
-  const double units_per_m = 0.25;
-  const double pitch_rad = 0.02;  // of the camera, looking up
-  const double bend_per_m = 4e-4;
-  // Along y = bend z^2 (over a crest), in steps of 0.8 m.
-  const auto place = [&](double z) {
-    return Rigid3(so3_exp({pitch_rad - 2.0 * bend_per_m * z, 0.0, 0.0}),
-                  Eigen::Vector3d(0.0, bend_per_m * z * z, z) * units_per_m);
-  };
-  RoadPath path(options);
-  for (double z = -40.0; z < -0.4; z += 0.8) {
-    path.move(place(z + 0.8).inverse() * place(z));
-  }
-  RoadPrior prior;
-  path.predict(1.0 / units_per_m, prior);
-  EXPECT_NEAR(prior.slope_rad, pitch_rad, 1e-3);
-  EXPECT_NEAR(prior.drop, bend_per_m * options.camera_height_m, 1e-4);
-  EXPECT_GT(prior.profile_information(0, 0), 1e4);
-
-  RoadPath fresh(options);
-  fresh.predict(1.0, prior);
-  EXPECT_EQ(prior.slope_rad, 0.0);
-  EXPECT_EQ(prior.drop, 0.0);
-  EXPECT_LT(prior.profile_information(0, 0), 1e4);
-  path.rescale(2.0);
-  RoadPrior rescaled;
-  path.predict(0.5 / units_per_m, rescaled);
-  EXPECT_NEAR(rescaled.slope_rad, pitch_rad, 1e-3);
-}
-
 /// With what its filter knows then.
 struct Estimate : RoadScaleEstimate {
   double metres_per_unit = 1.0;

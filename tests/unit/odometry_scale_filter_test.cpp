@@ -10,18 +10,6 @@ constexpr double kDriftSigma = 0.019;  // in a second
 constexpr double kSigma = 0.03;
 constexpr ScaleWitness kRoad = ScaleWitness::kRoad;
 
-TEST(ScaleFilter, AveragesAndKnowsHowWell) {
-  ScaleFilter filter(0.0063);
-  std::mt19937_64 engine(3);
-  std::normal_distribution<double> noise(0.0, 0.03);
-  for (int i = 0; i < 200; ++i) {
-    filter.predict(kInterval_s);
-    filter.update(0.7 + noise(engine), kSigma, kRoad);
-  }
-  EXPECT_NEAR(filter.log_scale(), 0.7, 0.02);
-  EXPECT_LT(filter.sigma(), 0.015);
-}
-
 void measure(ScaleFilter& filter, int num, double log_scale, ScaleWitness witness = kRoad) {
   for (int i = 0; i < num; ++i) {
     filter.predict(kInterval_s);
@@ -85,30 +73,6 @@ TEST(ScaleFilter, WithoutJoiningEachMeasurementStandsAlone) {
     EXPECT_TRUE(filter.update(log_scale, kSigma, kRoad));
     EXPECT_EQ(filter.log_scale(), log_scale);
   }
-}
-
-TEST(ScaleFilter, WithoutMeasurementsTheDoubtGrows) {
-  ScaleFilter filter(kDriftSigma);
-  filter.update(0.0, kSigma, kRoad);
-  double last = filter.sigma();
-  for (int i = 0; i < 20; ++i) {
-    filter.predict(kInterval_s);
-    EXPECT_GT(filter.sigma(), last);
-    last = filter.sigma();
-  }
-  EXPECT_EQ(filter.log_scale(), 0.0);
-}
-
-TEST(ScaleFilter, WaysAreFollowedSoThatThePathLosesLittleWhereTheMapStretches) {
-  ScaleFilter filter(kDriftSigma);
-  constexpr double kSpeedSigma = 0.02;
-  double path_error = 0.0;  // mean over two seconds after a stretch of 3 %
-  for (int i = 0; i < 120; ++i) {
-    filter.predict(1.0 / 30.0);
-    filter.update(i < 60 ? 0.0 : 0.03, kSpeedSigma, ScaleWitness::kWay);
-    path_error += i < 60 ? 0.0 : (0.03 - filter.log_scale()) / 60.0;
-  }
-  EXPECT_LT(std::abs(path_error), 2e-4);
 }
 
 // Both in turn, each sure of itself: the road's plane may be a table, a way is one.

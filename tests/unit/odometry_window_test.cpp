@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/window.hpp"
+#include "odometry/window_estimator.hpp"
+#include "odometry/window_history.hpp"
+#include "support/estimator_run.hpp"
 #include "support/synthetic_drive_tracks.hpp"
 #include "support/test.hpp"
 
@@ -77,11 +80,10 @@ TEST(Window, TheWindowForgetsOldKeyframesAndTheirLandmarks) {
   for (const auto& [id, point] : window.landmarks) {
     EXPECT_LE((point - drive.points[static_cast<std::size_t>(id) % drive.points.size()]).norm(),
               1e-6);
-    bool is_seen = false;
-    for (const Keyframe& keyframe : window.keyframes) {
-      is_seen = is_seen || find_point(keyframe.points, id) != nullptr;
-    }
-    EXPECT_TRUE(is_seen) << "landmark " << id;
+    EXPECT_TRUE(std::ranges::any_of(
+        window.keyframes,
+        [&](const Keyframe& keyframe) { return find_point(keyframe.points, id) != nullptr; }))
+        << "landmark " << id;
   }
 }
 
@@ -107,17 +109,6 @@ TEST(Landmarks, WhatPassesWhileTheCameraStandsIsNone) {
   EXPECT_EQ(window.landmarks.size(), num_landmarks);
   triangulate_landmarks(window, drive.camera, {.min_way_deg = 0.0});
   EXPECT_EQ(window.landmarks.size(), num_landmarks + 40);  // they are as like landmarks as can be
-}
-
-TEST(Landmarks, WrongPlacesAreCulled) {
-  const WindowOptions options;
-  const DriveTracks drive(6, 0.0, 2);
-  Window window = window_of(drive, options);
-  const std::size_t num_landmarks = window.landmarks.size();
-  window.landmarks.begin()->second += Eigen::Vector3d(3.0, 0.0, 0.0);
-  window.landmarks.rbegin()->second.z() = -10.0;
-  cull_landmarks(window, drive.camera, options);
-  EXPECT_EQ(window.landmarks.size(), num_landmarks - 2);
 }
 
 TEST(BundleAdjustment, BringsAPushedWindowBackAndKeepsTheGauge) {
@@ -152,14 +143,6 @@ TEST(BundleAdjustment, ALandmarkBehindAKeyframeDoesNotStopTheRest) {
   EXPECT_EQ(window.landmarks.at(behind).z(), -5.0);
 }
 
-TEST(BundleAdjustment, TooSmallAWindowIsLeftAlone) {
-  const DriveTracks drive(2, 0.0, 4);
-  Window window = window_of(drive, {});
-  EXPECT_FALSE(refine_window(window, drive.camera, {}));
-  Window empty;
-  EXPECT_FALSE(refine_window(empty, drive.camera, {}));
-}
-
 TEST(Window, KnownLandmarksAreFixedWhereTheyAreSeenAndNoAdjustmentMovesThem) {
   const DriveTracks drive(6, 0.3, 4);
   Window window = window_of(drive, {});
@@ -188,6 +171,32 @@ TEST(Window, KnownLandmarksAreFixedWhereTheyAreSeenAndNoAdjustmentMovesThem) {
   EXPECT_LT((window.landmarks.at(id) - 2.0 * known.at(id) - Eigen::Vector3d::UnitX()).norm(), 1e-9);
   cull_landmarks(window, drive.camera, {.max_reprojection_error_px = 1e-9});
   EXPECT_TRUE(window.fixed.empty());  // those that are culled
+}
+
+TEST(WindowHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
+  const DriveTracks drive(40, 0.1, 24);
+  WindowEstimator estimator(config_without_scale(), drive.camera);
+  EstimatorRun run(estimator, drive);
+  for (int i = 0; i < drive.num_frames(); ++i) {
+    run.image = cv::Mat(drive.camera.height_px, drive.camera.width_px, CV_8UC3,
+                        cv::Scalar(i, 2 * i, 3 * i));
+    run.add(i);
+  }
+  const std::vector<Rigid3>& poses = estimator.trajectory();
+  const double unit_m = 1.0 / length_ratio(poses, drive.world_from_camera, 0, 39);
+  std::vector<double> errors;
+  for (const KeptLandmark& landmark : estimator.landmarks_since(0).landmarks) {
+    ASSERT_GE(landmark.frame, 0);
+    ASSERT_LT(landmark.frame, drive.num_frames());
+    errors.push_back(placing_error(landmark, poses, unit_m, drive));
+    EXPECT_GE(landmark.rgb[0], landmark.frame);  // of the last keyframe that saw it
+    EXPECT_LT(landmark.rgb[0], landmark.frame + 30);
+    EXPECT_EQ(landmark.rgb[2], 3 * landmark.rgb[0]);
+  }
+  ASSERT_GT(errors.size(), 300U);
+  std::ranges::sort(errors);
+  EXPECT_LT(errors[errors.size() / 2], 0.01);
+  EXPECT_LT(errors[errors.size() * 95 / 100], 0.05);
 }
 
 }  // namespace
