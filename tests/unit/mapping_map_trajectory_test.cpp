@@ -43,14 +43,6 @@ Rigid3 pose_of(const Similarity3& placed) { return {placed.rotation, placed.tran
 
 const Similarity3 kCorrection(1.2, so3_exp({0.05, -0.1, 0.02}), {3.0, -1.0, 2.0});
 
-TEST(MapTrajectory, IsTheWorldsWhereNothingIsKept) {
-  const Path path(3);
-  const auto placed = path.placed();
-  ASSERT_EQ(placed.size(), 3U);
-  EXPECT_THAT(pose_of(placed[2]), IsNearMotion(path.poses[2], 1e-14));
-  EXPECT_EQ(placed[2].scale, 1.0);
-}
-
 TEST(MapTrajectory, MovesAllFramesAsOneCorrectionDoes) {
   Path path(40);
   for (const int frame : {5, 12, 30}) {
@@ -74,18 +66,6 @@ TEST(MapTrajectory, GoesFromOneCorrectionToTheNextByTime) {
   EXPECT_NEAR(placed[12].scale, 1.2, 1e-9);
   EXPECT_THAT(placed[20].translation, IsNear(1.44 * path.poses[20].translation, 1e-9));
   EXPECT_THAT(placed[30].translation, IsNear(1.44 * path.poses[30].translation, 1e-9));
-}
-
-/// No step of the placed path is another one than its neighbours: nothing jumps at a keyframe.
-TEST(MapTrajectory, HasNoJumps) {
-  Path path(100);
-  path.keep(0, {});
-  path.keep(49, {1.02, so3_exp({0.0, 0.02, 0.0}), {-0.5, 0.1, 0.3}});
-  path.keep(99, {1.03, so3_exp({0.01, 0.03, 0.0}), {-1.0, 0.2, 0.0}});
-  const auto placed = path.placed();
-  for (std::size_t i = 1; i < placed.size(); ++i) {
-    EXPECT_NEAR((placed[i].translation - placed[i - 1].translation).norm(), 1.0, 0.08) << i;
-  }
 }
 
 /// A place is recognized at frame 20, and the world is moved: the frames before are of the old one.

@@ -55,14 +55,6 @@ TEST(PlaceCheck, FindsTheSimilarityOfTwoViews) {
   }
 }
 
-TEST(PlaceCheck, AnotherStreetIsNone) {
-  DescribedPoints one = street(1);
-  DescribedPoints other = street(2);
-  EXPECT_FALSE(
-      check_place(view_of(one.see(kOldPose, 1.0, 0)), view_of(other.see(kNewPose, 1.0, 100000)))
-          .has_value());
-}
-
 TEST(PlaceCheck, BothMustAgree) {
   DescribedPoints points = street();
   const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
@@ -130,22 +122,6 @@ TEST(PlaceCheck, WhatIsExpectedNeedsFewerCorners) {
       check_place(view_of(old), view_of(elsewhere), Expectation{expected.inverse()}).has_value());
 }
 
-TEST(PlaceCheck, LocatesAFrameWithoutLandmarks) {
-  DescribedPoints points = street();
-  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
-  KeptKeyframe frame = points.see(kNewPose, 1.0, 100000);
-  for (KeptCorner& corner : frame.corners) {
-    corner.in_camera.setConstant(NAN);
-  }
-  const auto found = locate_in_place(view_of(old), view_of(frame));
-  ASSERT_TRUE(found.has_value());
-  const Similarity3 truth = true_similarity();
-  EXPECT_LT(found->old_from_camera.rotation.angularDistance(truth.rotation), 0.002);
-  EXPECT_LT((found->old_from_camera.translation - truth.translation).norm(), 0.05);
-  DescribedPoints other = street(2);
-  EXPECT_FALSE(locate_in_place(view_of(old), view_of(other.see(kNewPose, 1.0, 0))).has_value());
-}
-
 /// Errors over their own standard deviations: rotation, translation, log scale.
 TEST(SimilarityRefinement, CovarianceIsThatOfTheErrors) {
   constexpr double kNoise_px = 0.8;
@@ -187,13 +163,6 @@ TEST(SimilarityRefinement, CovarianceIsThatOfTheErrors) {
   for (int i = 0; i < 7; ++i) {
     EXPECT_NEAR(mean_square[i], 1.0, 0.6) << i;
   }
-}
-
-TEST(SimilarityRefinement, TooFewPointsTellNothing) {
-  const CrossObservations none{kitti_camera(), kitti_camera(), {}, {}};
-  const auto found = refine_similarity(true_similarity(), none);
-  EXPECT_EQ(found.a_from_b.scale, true_similarity().scale);
-  EXPECT_TRUE(std::isinf(found.covariance(6, 6)));
 }
 
 }  // namespace
