@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/frame_files.hpp"
 #include "dataset/frame_source.hpp"
-#include "support/shared_data.hpp"
 #include "support/test.hpp"
 #include "support/write_video.hpp"
 
@@ -223,24 +222,26 @@ TEST_F(Recordings, AVideoIsTurnedAsPlayersDo) {
   with_matrix({1, 0, 0, 1});
   expect_first(picture, 0);
   cv::Mat turned;
-  cv::rotate(picture, turned, cv::ROTATE_180);
-  with_matrix({-1, 0, 0, -1});
-  expect_first(turned, 1);
-  cv::rotate(picture, turned, cv::ROTATE_90_COUNTERCLOCKWISE);
-  with_matrix({0, -1, 1, 0});
-  expect_first(turned, 1);
-  cv::rotate(picture, turned, cv::ROTATE_90_CLOCKWISE);
-  with_matrix({0, 1, -1, 0});
-  expect_first(turned, 1);
+  for (const auto& [matrix, rotation] :
+       {std::pair(std::array<signed char, 4>{-1, 0, 0, -1}, cv::ROTATE_180),
+        {{0, -1, 1, 0}, cv::ROTATE_90_COUNTERCLOCKWISE},
+        {{0, 1, -1, 0}, cv::ROTATE_90_CLOCKWISE}}) {
+    cv::rotate(picture, turned, rotation);
+    with_matrix(matrix);
+    expect_first(turned, 1);
+  }
   expect_first(picture, 0);  // the camera file's size decides
+  const auto expect_mirrored = [&] {
+    EXPECT_THAT(error_of(video), AllOf(HasSubstr("turned.mp4"), HasSubstr("mirror")));
+  };
   with_matrix({-1, 0, 0, 1});
-  EXPECT_THAT(error_of(video), AllOf(HasSubstr("turned.mp4"), HasSubstr("mirror")));
+  expect_mirrored();
   of_movie = {1, 0, 0, -1};
   cv::rotate(picture, turned, cv::ROTATE_180);
   with_matrix({-1, 0, 0, 1});
   expect_first(turned, 1);  // mirrored twice
   with_matrix({1, 0, 0, 1});
-  EXPECT_THAT(error_of(video), AllOf(HasSubstr("turned.mp4"), HasSubstr("mirror")));
+  expect_mirrored();
 }
 
 TEST_F(Recordings, RawMotionJpegIsCountedAtTheGivenRate) {
@@ -374,23 +375,6 @@ TEST_F(Recordings, ACameraThatIsNotThere) {
   live.camera_file = camera("");
   EXPECT_THAT(error_of(live), AllOf(HasSubstr("/dev/video987"), HasSubstr("found none")));
   EXPECT_THAT(error_of(request("camera:x")), HasSubstr("camera:N"));
-}
-
-TEST_F(Recordings, RealOnesAreRecognised) {
-  STEMVO_NEEDS_SHARED_DATA();
-  const fs::path base = shared_data();
-  const auto euroc = open_source(request(base / "euroc"));
-  EXPECT_EQ(euroc->kind, "EuRoC recording");
-  EXPECT_GT(euroc->size(), 10U);
-  const auto image = euroc->read(0);
-  EXPECT_EQ(image->cols, euroc->camera.width_px);
-  EXPECT_EQ(image->rows, euroc->camera.height_px);
-  FrameSourceRequest tum = request(base / "tum");
-  tum.camera_file = temp_.file("tum.yaml",
-                               "resolution: [640, 480]\nintrinsics: [517.3, 516.5, 318.6, 255.3]\n"
-                               "distortion_model: none\n");
-  const auto desk = open_source(tum);
-  EXPECT_EQ(desk->kind, "TUM RGB-D recording");
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <opencv2/calib3d.hpp>
 
+#include "dataset/frame_files.hpp"
 #include "geometry/distortion.hpp"
 #include "odometry/frame_view.hpp"
 #include "support/test.hpp"
@@ -40,19 +41,19 @@ std::vector<NamedLens> lenses() {
   };
 }
 
+cv::Matx33d matrix_of(const Camera& c) {
+  return {c.fx_px, 0, c.cx_px, 0, c.fy_px, c.cy_px, 0, 0, 1};
+}
+
 /// OpenCV's own formulas, of a point on the plane z = 1.
-cv::Point2d project_by_opencv(const Camera& camera, const cv::Point2d& xy) {
-  const Camera& c = camera;
-  const cv::Matx33d k(c.fx_px, 0, c.cx_px, 0, c.fy_px, c.cy_px, 0, 0, 1);
+cv::Point2d project_by_opencv(const Camera& camera, const Eigen::Vector2d& xy) {
   std::vector<cv::Point2d> result;
   if (camera.distortion == Distortion::kEquidistant) {
-    const cv::Vec4d coefficients(camera.distortion_coefficients.data());
-    cv::fisheye::distortPoints(std::vector<cv::Point2d>{xy}, result, k, coefficients);
+    cv::fisheye::distortPoints(std::vector<cv::Point2d>{{xy.x(), xy.y()}}, result,
+                               matrix_of(camera), cv::Vec4d(camera.distortion_coefficients.data()));
   } else {
-    const std::vector<double> coefficients(camera.distortion_coefficients.begin(),
-                                           camera.distortion_coefficients.end());
-    cv::projectPoints(std::vector<cv::Point3d>{{xy.x, xy.y, 1.0}}, cv::Vec3d(), cv::Vec3d(), k,
-                      coefficients, result);
+    cv::projectPoints(std::vector<cv::Point3d>{{xy.x(), xy.y(), 1.0}}, cv::Vec3d(), cv::Vec3d(),
+                      matrix_of(camera), camera.distortion_coefficients, result);
   }
   return result.front();
 }
@@ -62,11 +63,6 @@ class UndistortionTest : public ::testing::TestWithParam<NamedLens> {
   const Camera lens_ = GetParam().camera;
   const FrameView undistortion_ = FrameView::create(lens_).value();
   const Camera view_ = undistortion_.camera();
-
-  cv::Point2d source_of(double u, double v) const {
-    const Eigen::Vector2d xy = view_.normalize({u, v});
-    return project_by_opencv(lens_, {xy.x(), xy.y()});
-  }
 };
 
 /// The scene: a grid of round spots, in pixels of the view.
@@ -86,9 +82,6 @@ double brightness(const cv::Point2d& at) {
 
 /// The scene as the lens shows it, each pixel where OpenCV says it comes from.
 cv::Mat draw_through(const Camera& camera, const Camera& view) {
-  const auto matrix = [](const Camera& c) {
-    return cv::Matx33d(c.fx_px, 0, c.cx_px, 0, c.fy_px, c.cy_px, 0, 0, 1);
-  };
   cv::Mat image(camera.height_px, camera.width_px, CV_8UC1);
   std::vector<cv::Point2d> pixels;
   for (int i = 0; i < static_cast<int>(image.total()); ++i) {
@@ -97,14 +90,12 @@ cv::Mat draw_through(const Camera& camera, const Camera& view) {
   std::vector<cv::Point2d> scene;
   const cv::TermCriteria exact(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-12);
   if (camera.distortion == Distortion::kEquidistant) {
-    cv::fisheye::undistortPoints(pixels, scene, matrix(camera),
+    cv::fisheye::undistortPoints(pixels, scene, matrix_of(camera),
                                  cv::Vec4d(camera.distortion_coefficients.data()), cv::noArray(),
-                                 matrix(view));
+                                 matrix_of(view));
   } else {
-    const std::vector<double> coefficients(camera.distortion_coefficients.begin(),
-                                           camera.distortion_coefficients.end());
-    cv::undistortPoints(pixels, scene, matrix(camera), coefficients, cv::noArray(), matrix(view),
-                        exact);
+    cv::undistortPoints(pixels, scene, matrix_of(camera), camera.distortion_coefficients,
+                        cv::noArray(), matrix_of(view), exact);
   }
   for (int i = 0; i < static_cast<int>(image.total()); ++i) {
     image.at<std::uint8_t>(i / image.cols, i % image.cols) =
@@ -135,17 +126,6 @@ TEST_P(UndistortionTest, SpotsComeToLieWhereAPinholeCameraShowsThem) {
   std::cout << worst_px << " px\n";
 }
 
-TEST_P(UndistortionTest, TheFormulasAreOpencvs) {
-  for (double y = -0.6; y <= 0.6; y += 0.2) {
-    for (double x = -0.7; x <= 0.7; x += 0.1) {
-      const Eigen::Vector2d found = distort(lens_, {x, y});
-      const cv::Point2d expected = project_by_opencv(lens_, {x, y});
-      EXPECT_NEAR(lens_.fx_px * found.x() + lens_.cx_px, expected.x, 1e-6);
-      EXPECT_NEAR(lens_.fy_px * found.y() + lens_.cy_px, expected.y, 1e-6);
-    }
-  }
-}
-
 TEST_P(UndistortionTest, EveryPixelComesFromInsideAndTheViewIsAsWideAsThatAllows) {
   double margin_px = 1e9;  // of the rim of the view to that of the lens' image
   for (int v = 0; v < view_.height_px; ++v) {
@@ -153,7 +133,7 @@ TEST_P(UndistortionTest, EveryPixelComesFromInsideAndTheViewIsAsWideAsThatAllows
       if (u % 50 != 0 && v % 50 != 0 && u != view_.width_px - 1 && v != view_.height_px - 1) {
         continue;
       }
-      const cv::Point2d source = source_of(u, v);
+      const cv::Point2d source = project_by_opencv(lens_, view_.normalize({1.0 * u, 1.0 * v}));
       margin_px = std::min({margin_px, source.x, source.y, view_.width_px - 1 - source.x,
                             view_.height_px - 1 - source.y});
     }
@@ -166,18 +146,6 @@ TEST_P(UndistortionTest, EveryPixelComesFromInsideAndTheViewIsAsWideAsThatAllows
   EXPECT_TRUE(margin_px < 0.01 || scale < 0.8 + 1e-9) << margin_px << " px at " << scale;
   EXPECT_EQ(view_.cx_px, lens_.cx_px);
   EXPECT_EQ(view_.cy_px, lens_.cy_px);
-}
-
-TEST_P(UndistortionTest, ColourIsUndistortedAsGrayIs) {
-  cv::Mat gray(lens_.height_px, lens_.width_px, CV_8UC1);
-  cv::randu(gray, 0, 255);
-  cv::Mat color;
-  cv::merge(std::vector<cv::Mat>{gray, gray, gray}, color);
-  std::vector<cv::Mat> planes;
-  cv::split(undistortion_.apply(color), planes);
-  for (const cv::Mat& plane : planes) {
-    EXPECT_EQ(cv::norm(plane, undistortion_.apply(gray), cv::NORM_INF), 0.0);
-  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Lenses,
@@ -203,6 +171,85 @@ TEST(Undistortion, CoefficientsThatTurnTheImageInsideOutAreRefused) {
         message_of(FrameView::create(with_lens(camera, Distortion::kRadialTangential, {k1}))),
         ::testing::HasSubstr("distortion coefficients"));
   }
+}
+
+using dataset::make_mask;
+
+Camera camera_of(int width_px, int height_px) {
+  return {0.9 * width_px,        0.9 * width_px, 0.5 * width_px - 0.5,
+          0.5 * height_px - 0.5, width_px,       height_px};
+}
+
+cv::Size working_size(int width_px, int height_px) {
+  const Camera camera = working_camera(camera_of(width_px, height_px));
+  return {camera.width_px, camera.height_px};
+}
+
+TEST(WorkingSize, OnlyLargeFramesAreMadeSmaller) {
+  EXPECT_EQ(working_size(1241, 376), cv::Size(1241, 376));
+  EXPECT_EQ(working_size(1280, 1024), cv::Size(1280, 1024));
+  EXPECT_EQ(working_size(1920, 1080), cv::Size(1280, 720));
+  EXPECT_EQ(working_size(3840, 2160), cv::Size(1280, 720));
+  EXPECT_EQ(working_size(2448, 2048), cv::Size(979, 819));
+  EXPECT_EQ(working_size(2000000, 1), cv::Size(1333333, 1)) << "a side never vanishes";
+}
+
+/// Where a dot is found in the small image is where the small camera sees its ray.
+TEST(WorkingSize, TheCameraShrinksWithTheImage) {
+  Camera camera = camera_of(2447, 2049);
+  const auto view = FrameView::create(camera);
+  cv::Mat image(2049, 2447, CV_8UC1, cv::Scalar(0));
+  image(cv::Rect(300, 1500, 51, 51)) = 255;
+  const cv::Mat small = view->apply(image);
+  ASSERT_EQ(small.cols, view->camera().width_px);
+  const cv::Moments moments = cv::moments(small);
+  const Eigen::Vector2d centre(moments.m10 / moments.m00, moments.m01 / moments.m00);
+  const Eigen::Vector2d ray = camera.normalize({325.0, 1525.0});
+  EXPECT_LT((view->camera().project({ray.x(), ray.y(), 1.0}) - centre).norm(), 0.02);
+}
+
+TEST(Mask, RectanglesAndImages) {
+  TempFolder temp;
+  cv::Mat drawn(48, 64, CV_8UC1, cv::Scalar(255));
+  drawn(cv::Rect(0, 0, 4, 4)) = 0;
+  cv::imwrite(temp / "mask.png", drawn);
+  const auto mask = make_mask({"10,40,20,100", temp / "mask.png"}, {64, 48});
+  EXPECT_EQ(mask->at<unsigned char>(3, 3), 0);
+  EXPECT_EQ(mask->at<unsigned char>(47, 29), 0);
+  EXPECT_EQ(mask->at<unsigned char>(47, 30), 255);
+  EXPECT_EQ(cv::countNonZero(*mask), 64 * 48 - 16 - 20 * 8);
+  EXPECT_TRUE(make_mask({}, {64, 48})->empty());
+}
+
+TEST(Mask, WhatIsNone) {
+  TempFolder temp;
+  cv::imwrite(temp / "small.png", cv::Mat(4, 4, CV_8UC1, cv::Scalar(0)));
+  const auto error_of = [](const std::string& part) {
+    return message_of(make_mask({part}, {64, 48}));
+  };
+  EXPECT_THAT(error_of("64,0,5,5"), HasSubstr("64x48"));
+  EXPECT_THAT(error_of("1,1,0,5"), HasSubstr("a rectangle inside"));
+  EXPECT_THAT(error_of("0,0,64,48"), HasSubstr("that is left"));
+  EXPECT_THAT(error_of("1,1,5"), HasSubstr("expected X,Y,WIDTH,HEIGHT in pixels of the frames, as "
+                                           "0,300,1241,76, or an image, found 1,1,5: "));
+  EXPECT_THAT(error_of("1,1,5,-5"), HasSubstr("a rectangle inside"));
+  EXPECT_THAT(error_of(temp / "small.png"), HasSubstr("found 4x4"));
+}
+
+TEST(Mask, GoesTheWayOfTheFrames) {
+  Camera camera = camera_of(1920, 1080);
+  camera.distortion = Distortion::kRadialTangential;
+  camera.distortion_coefficients = {-0.2, 0.05};
+  const auto view = FrameView::create(camera);
+  const auto mask = make_mask({"0,900,1920,180"}, {1920, 1080});
+  const cv::Mat seen = view->apply_to_mask(*mask);
+  cv::Mat frame(1080, 1920, CV_8UC1, cv::Scalar(0));
+  frame(cv::Rect(0, 900, 1920, 180)) = 200;
+  const cv::Mat bonnet = view->apply(frame) > 0;
+  ASSERT_EQ(seen.size(), cv::Size(1280, 720));
+  EXPECT_GT(cv::countNonZero(bonnet), 1280 * 60);
+  EXPECT_EQ(cv::countNonZero(bonnet & seen), 0) << "no pixel of the bonnet is left";
+  EXPECT_LT(cv::countNonZero(~bonnet & ~seen), 2 * 1280);
 }
 
 }  // namespace
