@@ -165,6 +165,7 @@ TEST_F(PipelineRun, ThePageHoldsFramesThatLackATruePose) {
   EXPECT_EQ(page["frames_csv"], read_all(request_.out_dir / "frames.csv"));
   EXPECT_EQ(page["estimate"]["x"].size(), 1U * kNumFrames);
   EXPECT_EQ(page["truth"]["x"].size(), 2U);
+  EXPECT_EQ(page["truth"]["frames"], nlohmann::json({1, 4}));
   EXPECT_THAT(page["subtitle"].get<std::string>(),
               AllOf(HasSubstr("path 0.15 m, fitted by sim3: average offset "),
                     HasSubstr(", ground truth for 2 of 6 frames")));
@@ -271,16 +272,6 @@ TEST_F(PipelineRun, AMapIsSavedAndTakenUpAgain) {
   EXPECT_THAT(error_of(request_), HasSubstr("poses.txt: expected a new file or a map of stemvo"));
   request_.saved_map = folder_ / "nowhere/saved.map";
   EXPECT_THAT(error_of(request_), HasSubstr("nowhere/saved.map: cannot write"));
-}
-
-TEST_F(PipelineRun, ConfigYamlHoldsWhatRan) {
-  request_.config.seed = 42;
-  ASSERT_TRUE(run_sequence(request_).value().written);
-  EXPECT_THAT(read_all(request_.out_dir / "config.yaml"), HasSubstr("# frames 0:6 of 07\n"));
-  const Expected<Config> config = load_config(request_.out_dir / "config.yaml");
-  EXPECT_EQ(config->seed, 42U);
-  EXPECT_EQ(config->stem.filter, 0);       // what -1 stood for
-  EXPECT_EQ(config->stem.sampling_px, 1);  // what 0 stood for
 }
 
 TEST_F(PipelineRun, StoppedEarlyHoldsWhatWasComputed) {

@@ -220,14 +220,5 @@ TEST(EvaluateFiles, TableAndJsonSayTheSame) {
             report->zero_motion.metrics.null_offset_m);
 }
 
-TEST(ParseAlignment, KnowsItsFourWords) {
-  for (const std::string word : {"none", "scale", "se3", "sim3"}) {
-    ASSERT_TRUE(parse_alignment(word)) << word;
-    EXPECT_EQ(to_string(*parse_alignment(word)), word);
-  }
-  EXPECT_THAT(message_of(parse_alignment("7dof")),
-              HasSubstr("expected none, scale, se3 or sim3, found '7dof'"));
-}
-
 }  // namespace
 }  // namespace stemvo

@@ -193,19 +193,6 @@ TEST(MetricsTable, LengthsBelowAMetreHaveThreeSignificantDigits) {
   EXPECT_THAT(table, ContainsRegex("ATE +0\\.00  m +none")) << "nothing but rounding";
 }
 
-TEST(MetricsTable, SaysThatTheCameraHardlyMoved) {
-  MetricsReport report = example();
-  report.in_place_fraction = 0.94;
-  EXPECT_THAT(format_metrics_table(report), Not(HasSubstr("hardly")));
-  report.in_place_fraction = 1.0;
-  const std::string table = format_metrics_table(report);
-  const std::size_t at = table.find("\nmotion ") + 1;
-  const std::string line = table.substr(at, table.find('\n', at) - at);
-  EXPECT_THAT(line, HasSubstr("hardly any (100.0 % of the frames in place)"));
-  EXPECT_LE(line.size(), 80U);
-  EXPECT_EQ(written(report)["in_place_fraction"], 1.0);
-}
-
 TEST(MetricsTable, SaysWhatIsMissing) {
   MetricsReport report = example();
   report.metrics->t_rel_percent.reset();

@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "evaluation/trajectory.hpp"
+#include "html/page.hpp"
 #include "report/run_page.hpp"
 #include "support/report_content.hpp"
 #include "support/test.hpp"
@@ -72,17 +73,6 @@ TEST_F(RunPageTest, HoldsTheMapsPathAndItsLoops) {
   EXPECT_EQ(page["map"]["loops"], json({{3, 180}}));
 }
 
-TEST_F(RunPageTest, NamesTheFramesThatHaveATruePose) {
-  truth_->frames = {40, 100, 190};
-  truth_->poses = take_poses(truth_->poses, truth_->frames);
-  report_.metrics = evaluate(take_poses(estimate_, truth_->frames), truth_->poses);
-  const json page = content();
-  EXPECT_EQ(page["truth"]["frames"], json({40, 100, 190}));
-  EXPECT_EQ(page["truth"]["z"], json({40.0, 100.0, 190.0}));
-  EXPECT_EQ(page["estimate"]["z"].size(), 201U);
-  EXPECT_EQ(page["segments"]["length_m"].size(), 1U);
-}
-
 TEST_F(RunPageTest, WithoutGroundTruthThereIsNone) {
   truth_.reset();
   report_.metrics.reset();
@@ -113,6 +103,52 @@ TEST(SmallFrames, EveryTenthIsKeptAndFewerWhereTheyWouldTakeTooMuch) {
     few.add(row, row, image);
   }
   EXPECT_THAT(rows_of(few), ElementsAre(0, 40, 80));
+}
+
+class HtmlPage : public ::testing::Test {
+ protected:
+  std::string written(const nlohmann::ordered_json& content) {
+    EXPECT_TRUE(html::write_page(folder_ / "page.html", content));
+    return read_text_file(folder_ / "page.html").value_or("");
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(HtmlPage, TextFromOutsideStaysText) {
+  const std::string hostile = "</script><script>alert(1)</script> {{plotly}} \"' \xff <!--";
+  const std::string text = written({{"page", "run"}, {"title", hostile}});
+  EXPECT_THAT(text, Not(HasSubstr("alert(1)</script>")));
+  EXPECT_THAT(text, Not(HasSubstr("<!--\""))) << "a comment would swallow the rest";
+  EXPECT_THAT(text, HasSubstr("{{plotly}}")) << "a place of the template is filled in once";
+  EXPECT_EQ(report_content(text)["title"],
+            "</script><script>alert(1)</script> {{plotly}} \"' \xef\xbf\xbd <!--");
+}
+
+TEST_F(HtmlPage, ImagesAreInIt) {
+  EXPECT_EQ(html::images_json({{"frame 1", "\xff\xd8\x01", 7}})[0],
+            (nlohmann::ordered_json{{"row", 7}, {"caption", "frame 1"}, {"jpeg", "/9gB"}}));
+}
+
+TEST_F(HtmlPage, PathsAreRoundedAndWhatIsNotFiniteIsNull) {
+  std::vector<Rigid3> poses(2);
+  poses[0].translation = {1.234567, -2.0, 3.0};
+  poses[1].translation.x() = std::nan("");
+  const std::string text = written({{"page", "run"}, {"path", html::path_json(poses)}});
+  const nlohmann::json path = report_content(text)["path"];
+  EXPECT_EQ(path["x"], nlohmann::json({1.23457, nullptr}));
+  EXPECT_EQ(path["y"], nlohmann::json({-2.0, 0.0}));
+  EXPECT_EQ(path["z"], nlohmann::json({3.0, 0.0}));
+}
+
+TEST_F(HtmlPage, NeedsNothingFromElsewhereAndNamesTheLicence) {
+  const std::string text = written(nlohmann::ordered_json::object());
+  for (const char* elsewhere : {"src=\"http", "href=\"http", "@import", "url("}) {
+    EXPECT_THAT(text, Not(HasSubstr(elsewhere)));
+  }
+  EXPECT_THAT(text, HasSubstr("Plotly"));
+  EXPECT_THAT(text, HasSubstr("Permission is hereby granted, free of charge"));
+  EXPECT_THAT(text, Not(HasSubstr("@STEMVO"))) << "a place that the build fills in";
 }
 
 }  // namespace

@@ -20,15 +20,6 @@ void work_for(std::chrono::milliseconds time) {
   }
 }
 
-const StageTiming* find(const TimingReport& report, const std::string& name) {
-  for (const StageTiming& stage : report.stages) {
-    if (stage.name == name) {
-      return &stage;
-    }
-  }
-  return nullptr;
-}
-
 TEST(Timing, MedianAndP95AreAmongTheTimes) {
   StageRecorder recorder;
   for (int i = 100; i >= 1; --i) {
@@ -43,14 +34,6 @@ TEST(Timing, MedianAndP95AreAmongTheTimes) {
   EXPECT_EQ(report.stages[1].p95_ms, 95.0);
 }
 
-TEST(Timing, WithoutARecorderNothingIsKept) {
-  ASSERT_EQ(StageRecorder::active(), nullptr);
-  EXPECT_EQ(timed(Stage::kStem, [] { return 3; }), 3);
-  const StageRecorder recorder;
-  EXPECT_EQ(StageRecorder::active(), &recorder);
-  EXPECT_TRUE(recorder.report().stages.empty());
-}
-
 TEST(Timing, AStageHasItsCallsItsWallTimeAndItsProcessorTime) {
   StageRecorder recorder;
   for (int i = 0; i < 3; ++i) {
@@ -60,14 +43,14 @@ TEST(Timing, AStageHasItsCallsItsWallTimeAndItsProcessorTime) {
   const TimingReport report = recorder.report();
   ASSERT_EQ(report.stages.size(), 2U);
   EXPECT_EQ(report.stages.front().name, "read and decode") << "in the order of a frame's way";
-  const StageTiming* stem = find(report, "stem");
-  const StageTiming* read = find(report, "read and decode");
-  ASSERT_TRUE(stem != nullptr && read != nullptr);
-  EXPECT_EQ(stem->calls, 3U);
-  EXPECT_GE(stem->median_ms, 10.0);
-  EXPECT_GE(stem->cpu_s, 0.029);
-  EXPECT_GE(read->median_ms, 30.0);
-  EXPECT_LT(read->cpu_s, 0.01) << "sleeping is no work";
+  const StageTiming& read = report.stages[0];
+  const StageTiming& stem = report.stages[1];
+  EXPECT_EQ(stem.name, "stem");
+  EXPECT_EQ(stem.calls, 3U);
+  EXPECT_GE(stem.median_ms, 10.0);
+  EXPECT_GE(stem.cpu_s, 0.029);
+  EXPECT_GE(read.median_ms, 30.0);
+  EXPECT_LT(read.cpu_s, 0.01) << "sleeping is no work";
 }
 
 TEST(Timing, ThreadsAreSeenAndSharesAddUp) {
