@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "stem/model.hpp"
+#include "stem/onnx_session.hpp"
 #include "support/test.hpp"
 #include "support/tiny_stem.hpp"
 
@@ -88,6 +89,45 @@ TEST(Model, ALargerWindowThanTheGraphsIsRefused) {
   bytes = with_metadata(bytes, "padding", "1 1 2 1");
   EXPECT_THAT(internal::open_model(folder.file("changed.onnx", bytes).string()).error().message,
               HasSubstr("found that the 3x1 pixels at 0, 3 of it do not matter"));
+}
+
+std::string session_error(const std::string& name) {
+  return message_of(internal::OnnxSession::create(name, read_all(tiny_model(name))));
+}
+
+/// ONNX Runtime would look for them in the folder it runs in.
+TEST(OnnxSession, RefusesWeightsInAnotherFile) {
+  const std::filesystem::path file = "wrong_external.bin";
+  std::ofstream(file, std::ios::binary) << std::string(36, '\0');
+  EXPECT_THAT(session_error("wrong_external"),
+              AllOf(HasSubstr(": ONNX Runtime: "), HasSubstr("xternal data")));
+  std::filesystem::remove(file);
+}
+
+TEST(OnnxSession, RefusesOperatorsOfOthers) {
+  EXPECT_THAT(session_error("wrong_domain"),
+              AllOf(HasSubstr(": ONNX Runtime: "), HasSubstr("Steal")));
+}
+
+TEST(OnnxSession, RefusesOtherInputsAndOutputs) {
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"wrong_input_name",
+       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'x float 1x3x?x?'"},
+      {"wrong_two_outputs", "expected 1 output, found 2"},
+      {"wrong_rank", "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image float 3x?x?'"},
+      {"wrong_planes",
+       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image float 1x2x?x?'"},
+      {"wrong_type",
+       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image no float 1x3x?x?'"},
+      {"wrong_free_filters",
+       "expected output 'float 1xCxhxw' with C known, found 'channels float 1x?x?x?'"},
+      {"wrong_two_inputs", "expected 1 input, found 2"},
+      {"wrong_output_rank",
+       "expected output 'float 1xCxhxw' with C known, found 'channels float 1x?x?'"},
+  };
+  for (const auto& [name, message] : cases) {
+    EXPECT_EQ(session_error(name), name + ": " + message);
+  }
 }
 
 }  // namespace
