@@ -117,31 +117,5 @@ TEST(SyntheticImage, RoadHasNoMoreContrastThanARealOne) {
   }
 }
 
-TEST(SyntheticImage, BarsAreAveragedOverAnyFootprint) {
-  EXPECT_FLOAT_EQ(bars_coverage(0.05F, 0.01F, 1.0F, 0.1F), 1.0F);
-  EXPECT_FLOAT_EQ(bars_coverage(0.5F, 0.01F, 1.0F, 0.1F), 0.0F);
-  EXPECT_NEAR(bars_coverage(0.1F, 0.1F, 1.0F, 0.1F), 0.5F, 1e-5F);
-  EXPECT_NEAR(bars_coverage(123.3F, 50.0F, 1.0F, 0.1F), 0.1F, 2e-3F);
-  EXPECT_NEAR(bars_coverage(-3.95F, 0.05F, 1.0F, 0.1F), 1.0F, 1e-3F);
-  EXPECT_NEAR(box_coverage(1.0F, 2.0F, 1.0F, 9.0F), 0.5F, 1e-6F);
-}
-
-/// A wide sample must be the mean of many narrow ones, and the tile must have no seam.
-TEST(SyntheticImage, RipmapIsTheMeanOverItsFootprint) {
-  const Ripmap tile(octave_noise(5, {1.0, 1.0, 1.0}));
-  double mean = 0.0;
-  for (int i = 0; i < 256; ++i) {
-    mean +=
-        static_cast<double>(tile.sample(512.0F + static_cast<float>(i) + 0.5F, 16.5F, 1.0F, 1.0F)) /
-        256.0;
-  }
-  EXPECT_NEAR(static_cast<double>(tile.sample(640.0F, 16.5F, 256.0F, 1.0F)), mean, 1e-4);
-  constexpr auto kSize = static_cast<float>(Ripmap::kSize);
-  EXPECT_NEAR(tile.sample(3.25F, 7.5F, 2.0F, 5.0F),
-              tile.sample(3.25F - kSize, 7.5F + kSize, 2.0F, 5.0F), 1e-5F);
-  EXPECT_NEAR(tile.sample(-0.01F, 9.0F, 1.0F, 1.0F), tile.sample(0.01F, 9.0F, 1.0F, 1.0F), 0.2F);
-  EXPECT_NEAR(tile.sample(77.0F, 9.0F, 1e6F, 1e6F), 0.0F, 1e-3F);
-}
-
 }  // namespace
 }  // namespace stemvo::synth

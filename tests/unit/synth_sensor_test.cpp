@@ -21,13 +21,6 @@ double light_of(double value) {
   return low;
 }
 
-TEST(SmallChip, ResponseRisesAndCompressesHighlights) {
-  EXPECT_EQ(chip::response(0.0F), 0.0F);
-  EXPECT_NEAR(chip::response(1.0F), 1.0F, 1e-6F);
-  EXPECT_GT(chip::response(0.1F) - chip::response(0.0F),
-            2.0F * (chip::response(1.0F) - chip::response(0.9F)));
-}
-
 /// Even light: the deviation in electrons is that of photons and of reading, at any gain.
 TEST(SmallChip, NoiseIsThatOfPhotonsAndReading) {
   for (const float exposure : {0.5F, 1.0F, 2.0F}) {
@@ -59,51 +52,6 @@ TEST(SmallChip, NoiseIsThatOfPhotonsAndReading) {
       EXPECT_NEAR(sigma[0] * sigma[0], expected, 0.12 * expected) << exposure << ", " << level;
     }
   }
-}
-
-/// A step between two even halves is spread like a Gaussian's integral.
-TEST(SmallChip, SpreadsPoints) {
-  cv::Mat light(400, 41, CV_32FC3, cv::Scalar::all(0.1));
-  light.colRange(21, 41).setTo(cv::Scalar::all(0.5));
-  const cv::Mat rgb = expose_chip(light, 1.0F, 3);
-  std::vector<double> profile;
-  for (int x = 10; x < 32; ++x) {
-    double mean = 0.0;
-    for (int y = 150; y < 250; ++y) {
-      mean += light_of(rgb.at<cv::Vec3b>(y, x)[1] / 255.0) / 100.0;
-    }
-    profile.push_back(mean);
-  }
-  const double rise = profile.back() - profile.front();
-  double first = 0.0;
-  double second = 0.0;
-  for (std::size_t i = 1; i < profile.size(); ++i) {
-    const double share = (profile[i] - profile[i - 1]) / rise;
-    first += share * static_cast<double>(i);
-    second += share * static_cast<double>(i * i);
-  }
-  EXPECT_NEAR(std::sqrt(second - first * first), chip::kSpread_px, 0.12);
-}
-
-/// A smaller part of each pixel sees finer texture.
-TEST(SmallChip, GapsBetweenPixelsLeaveMoreContrast) {
-  const Drive drive = make_own_drive(3, 3);
-  const Camera camera = kitti_camera(0.25);
-  const Textures textures(3);
-  Scene scene(drive.world_from_camera[1].translation, {0.0, -0.8, 0.6}, 0.4);
-  add_street(drive.road, drive.arcs_m[1], 1, scene);
-  std::vector<const Face*> faces;
-  for (const Face& face : scene.faces()) {
-    faces.push_back(&face);
-  }
-  const Rigid3 pose(drive.world_from_camera[1].rotation, Vec3::Zero());
-  const auto fine_contrast = [&](double fill) {
-    const RenderedFrame frame = paint(faces, pose, camera, textures, {0, camera.height_px}, fill);
-    cv::Mat coarse;
-    cv::GaussianBlur(frame.rgb, coarse, {}, 1.0);
-    return cv::norm(frame.rgb - coarse, cv::NORM_L2);
-  };
-  EXPECT_GT(fine_contrast(0.8), 1.03 * fine_contrast(1.0));
 }
 
 constexpr double kRate_hz = 30.0;
@@ -192,17 +140,6 @@ TEST(Shutter, ShearsByReadoutTimesFlow) {
     }
     EXPECT_NEAR(best_px, expected_px, 0.35) << "row " << row;
   }
-}
-
-TEST(Shutter, WithoutMotionChangesNothing) {
-  Walk walk = turning();
-  std::ranges::fill(walk.world_from_camera, walk.world_from_camera.front());
-  const Renderer plain(walk, small_camera(), 3, {.walk_rate_hz = kRate_hz});
-  const Renderer slow(walk, small_camera(), 3,
-                      {.walk_rate_hz = kRate_hz, .exposure_s = 0.02, .readout_s = 0.02});
-  EXPECT_EQ(cv::norm(plain.render(2).rgb, slow.render(2).rgb, cv::NORM_INF), 0.0);
-  EXPECT_EQ(cv::norm(plain.render(2).depth_m < 1e6, slow.render(2).depth_m < 1e6, cv::NORM_INF),
-            0.0);
 }
 
 /// The camera looks one way, then another: its exposure is off at first and settles.

@@ -117,14 +117,5 @@ TEST(TrafficTest, FillsAThirdOfTheImageFromTheFirstFrameOn) {
   EXPECT_LT(most, 0.7);
 }
 
-TEST(TrafficTest, HasCrossingsWhereTheCameraStands) {
-  int crossings = 0;
-  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    const Drive drive = make_own_drive(300, seed, true);
-    crossings += plan_traffic(drive, seed).crossings.empty() ? 0 : 1;
-  }
-  EXPECT_GE(crossings, 4);
-}
-
 }  // namespace
 }  // namespace stemvo::synth

@@ -82,37 +82,6 @@ TEST(Visit, DriveThatComesBackSeesTheSameStreet) {
   }
 }
 
-TEST(Visit, DriveWithoutComingBackKeepsItsPoses) {
-  Trajectory given = round_a_block();
-  given.resize(350);
-  const Drive drive = make_drive_along(given);
-  ASSERT_EQ(drive.road.parts().size(), 1U);
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    ASSERT_EQ(drive.world_from_camera[i].translation, given[i].translation);
-  }
-}
-
-TEST(Visit, SameStreetOnAnotherPath) {
-  for (const int visit : {1, 2, 3}) {
-    const Drive first = make_own_drive(120, 4);
-    Drive again = first;
-    drive_again(4, visit, again);
-    EXPECT_EQ(again.road.knot(100).position, first.road.knot(100).position);
-    for (std::size_t i = 0; i + 10 < again.world_from_camera.size(); ++i) {
-      const Rigid3& pose = again.world_from_camera[i];
-      const RoadFrame road = again.road.at(again.arcs_m[i]);
-      const double height_m = (pose.translation - road.position).dot(road.up);
-      EXPECT_NEAR(height_m, kCameraHeight_m, 0.25) << "visit " << visit << ", frame " << i;
-      double nearest_m = 100.0;
-      for (const Rigid3& other : first.world_from_camera) {
-        nearest_m = std::min(nearest_m, (other.translation - pose.translation).norm());
-      }
-      EXPECT_LT(nearest_m, 1.4) << "visit " << visit << ", frame " << i;
-      EXPECT_GT(nearest_m, 0.02) << "visit " << visit << ", frame " << i;
-    }
-  }
-}
-
 TEST(Visit, SameCourtyardOnAnotherWay) {
   const Walk first = make_walk(600, 4, {.walk_rate_hz = 30.0});
   const Walk again = make_walk(600, 4, {.visit = 1});
