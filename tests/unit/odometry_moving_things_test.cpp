@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/moving_things.hpp"
+#include "odometry/tracks.hpp"
 #include "odometry/window_estimator.hpp"
 #include "support/estimator_run.hpp"
 #include "support/test.hpp"
@@ -87,6 +88,23 @@ void expect_true_path_behind_lorry(double turn_rad) {
 TEST(MovingThings, ALorryAheadAtOneDistanceDoesNotHoldTheRotation) {
   expect_true_path_behind_lorry(0.02);
   expect_true_path_behind_lorry(0.0025);  // less than a frame alone would tell
+}
+
+TEST(StandingCamera, StandsByTheMedianFlowOfTwentyTracks) {
+  Observations before;
+  Observations now;
+  for (int i = 0; i < 21; ++i) {
+    const Eigen::Vector2d uv(10.0 * i, 50.0);
+    before.push_back({i, uv});
+    now.push_back({i, uv + Eigen::Vector2d(i < 10 ? 30.0 : 0.1, 0.0)});  // others pass by
+  }
+  EXPECT_TRUE(is_stationary(before, now, 0.15, 20));
+  EXPECT_FALSE(is_stationary(before, now, 0.05, 20));
+  now[10].uv.x() += 30.0;
+  EXPECT_FALSE(is_stationary(before, now, 0.15, 20));
+  now[10].uv.x() -= 30.0;
+  now.resize(19);
+  EXPECT_FALSE(is_stationary(before, now, 0.15, 20));
 }
 
 TEST(StandingCamera, StaysWhileOthersPassBy) {

@@ -92,16 +92,6 @@ TEST(WindowEstimator, MissingImagesAreBridgedAndTheMapServesOn) {
   expect_accurate(d, 0.01, 0.3 * kDeg);
 }
 
-TEST(WindowEstimator, MissingImagesBeforeTheFirstOneAreNoStart) {
-  Driven d(car_drive(10.0, 0.8, 0.1, 9));
-  EXPECT_EQ(d.run.add_missing().state, FrameState::kNoImage);
-  EXPECT_EQ(d.run.add(0).state, FrameState::kFirst);
-  EXPECT_EQ(d.run.add(1).state, FrameState::kInitializing);
-  d.add_range(2, 8);
-  EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
-  EXPECT_EQ(d.estimator.trajectory().size(), 9U);
-}
-
 TEST(WindowEstimator, AMissingImageWhileInitializingIsNoEnd) {
   Driven d(hand_walk(90, 0.1, 10));
   d.add_range(0, 4);

@@ -11,6 +11,84 @@ namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
+Eigen::Matrix3d shift(double x, double y) {
+  Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
+  h(0, 2) = x;
+  h(1, 2) = y;
+  return h;
+}
+
+/// Pure sideways motion: epipolar lines are the rows of the image.
+Eigen::Matrix3d row_fundamental() { return skew(Eigen::Vector3d(1.0, 0.0, 0.0)); }
+
+TEST(ScoreHomography, HandWorked) {
+  const Points prev = {{0.0, 0.0}, {100.0, 50.0}, {200.0, 80.0}, {10.0, 20.0}};
+  // Shifted by (5, 0), then off by 0, 1, 2 and 3 px: the last is past sqrt(5.991) = 2.448.
+  const Points cur = {{5.0, 0.0}, {105.0, 51.0}, {203.0, 80.0}, {15.0, 23.0}};
+  const ModelScore score = score_homography(shift(5.0, 0.0), {prev, cur}, 1.0);
+  EXPECT_NEAR(score.score, 2.0 * (3.0 * 5.991 - 0.0 - 1.0 - 4.0), 1e-9);
+  EXPECT_EQ(score.num_inliers, 3);
+  EXPECT_THAT(score.inlier_mask, ::testing::ElementsAre(1, 1, 1, 0));
+  EXPECT_NEAR(score_homography(shift(5.0, 0.0), {prev, cur}, 2.0).score,
+              2.0 * (4.0 * 5.991 - (0.0 + 1.0 + 4.0 + 9.0) / 4.0), 1e-9);
+}
+
+TEST(ScoreHomography, BothDirectionsAreCounted) {
+  // Twice as large in cur: 3 px there are 1.5 px in prev, so one direction passes alone.
+  const Eigen::Matrix3d zoom = Eigen::Vector3d(2.0, 2.0, 1.0).asDiagonal();
+  const Points prev = {{10.0, 10.0}};
+  const Points cur = {{23.0, 20.0}};
+  const ModelScore score = score_homography(zoom, {prev, cur}, 1.0);
+  EXPECT_NEAR(score.score, 5.991 - 2.25, 1e-9);
+  EXPECT_EQ(score.num_inliers, 0);
+}
+
+TEST(ScoreFundamental, HandWorked) {
+  const Points prev = {{0.0, 0.0}, {100.0, 50.0}, {200.0, 80.0}, {10.0, 20.0}};
+  // Rows differ by 0, 1, 1.9 and 2 px: the last is past sqrt(3.841) = 1.96.
+  const Points cur = {{50.0, 0.0}, {20.0, 51.0}, {203.0, 78.1}, {900.0, 22.0}};
+  const ModelScore score = score_fundamental(row_fundamental(), {prev, cur}, 1.0);
+  EXPECT_NEAR(score.score, 2.0 * (3.0 * 5.991 - 0.0 - 1.0 - 3.61), 1e-9);
+  EXPECT_EQ(score.num_inliers, 3);
+  EXPECT_THAT(score.inlier_mask, ::testing::ElementsAre(1, 1, 1, 0));
+  EXPECT_NEAR(score_fundamental(row_fundamental(), {prev, cur}, 2.0).score,
+              2.0 * (4.0 * 5.991 - (0.0 + 1.0 + 3.61 + 4.0) / 4.0), 1e-9);
+}
+
+TEST(DecomposeHomography, TrueMotionIsAmongTheEight) {
+  const Eigen::Matrix3d k = kitti_camera().matrix();
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    SceneRandom random(seed);
+    const Rigid3 motion = random.motion(0.5);
+    Eigen::Vector3d normal = random.direction();
+    normal *= normal.z() < 0.0 ? -1.0 : 1.0;
+    const double distance = random.uniform(1.5, 10.0);
+    const Eigen::Matrix3d euclidean =
+        motion.rotation_matrix() + motion.translation * normal.transpose() / distance;
+    const double scale = seed % 3 == 0 ? -3e5 : seed % 3 == 1 ? 1.0 : 1e-6;  // of one that has none
+    const auto hypotheses =
+        decompose_homography(scale * k * euclidean * k.inverse(), kitti_camera());
+    ASSERT_EQ(hypotheses.size(), 8U);
+    double best = std::numeric_limits<double>::infinity();
+    for (const Rigid3& found : hypotheses) {
+      best = std::min(best, std::max(rotation_error_rad(found, motion),
+                                     direction_error_rad(found.translation, motion.translation)));
+    }
+    EXPECT_LE(best, 1e-9) << "seed " << seed;
+  }
+}
+
+TEST(DecomposeHomography, RefusesWhatDoesNotDecompose) {
+  const Camera camera = kitti_camera();
+  const Eigen::Matrix3d k = camera.matrix();
+  const Eigen::Matrix3d rotation = so3_exp(Eigen::Vector3d(0.01, -0.2, 0.03)).toRotationMatrix();
+  EXPECT_TRUE(decompose_homography(k * rotation * k.inverse(), camera).empty());
+  EXPECT_TRUE(decompose_homography(Eigen::Matrix3d::Zero(), camera).empty());
+  EXPECT_TRUE(decompose_homography(Eigen::Matrix3d::Identity(), camera).empty());
+  // Rank 1.
+  EXPECT_TRUE(decompose_homography(Eigen::Matrix3d::Ones(), camera).empty());
+}
+
 TEST(MotionFromEssential, ExactMatchesGiveTheTrueMotion) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     const Scene scene = make_scene({.seed = seed});
@@ -152,24 +230,6 @@ double squared_reprojection(const Rigid3& cur_from_prev,
                             const Eigen::Vector2d& prev,
                             const Eigen::Vector2d& cur) {
   return (image(point) - prev).squaredNorm() + (image(cur_from_prev * point) - cur).squaredNorm();
-}
-
-TEST(Triangulate, ExactMatchesGiveTheExactPoint) {
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const Scene scene = make_scene({.num_points = 50, .seed = seed});
-    for (std::size_t i = 0; i < scene.prev_uv.size(); ++i) {
-      const Eigen::Vector3d& truth = scene.points_in_prev[i];
-      const TriangulatedPoint point =
-          triangulate(scene.cur_from_prev, scene.camera.normalize(scene.prev_uv[i]),
-                      scene.camera.normalize(scene.cur_uv[i]));
-      ASSERT_TRUE(point.finite);
-      // Near the epipole the rays are almost parallel: rounding counts 1 / parallax times.
-      const double parallax = std::acos(std::min(point.cos_parallax, 1.0));
-      EXPECT_THAT(point.in_prev, IsNear(truth, 1e-12 * truth.norm() / parallax));
-      const Eigen::Vector3d from_cur = truth - scene.cur_from_prev.inverse().translation;
-      EXPECT_NEAR(point.cos_parallax, truth.normalized().dot(from_cur.normalized()), 1e-12);
-    }
-  }
 }
 
 TEST(Triangulate, NoisyMatchesGiveTheLeastReprojectionError) {
