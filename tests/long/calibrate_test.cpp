@@ -71,30 +71,21 @@ TEST_F(Calibrate, AStraightRoadTellsNothing) {
   EXPECT_FALSE(fs::exists(out_));
 }
 
-void expect_error(const ProgramResult& result, const Words& words) {
-  EXPECT_EQ(result.exit_code, 1) << result.out;
-  EXPECT_THAT(result.err, HasSubstr("error: "));
-  EXPECT_THAT(result.err, ::testing::Not(HasSubstr("internal")));
-  for (const std::string& word : words) {
-    EXPECT_THAT(result.err, HasSubstr(word));
-  }
-}
-
 TEST_F(Calibrate, WhatIsWrongIsSaid) {
-  expect_error(calibrate({"--frames", "0:2", "--quiet"}), {sequence_.string(), "2 frames"});
-  expect_error(calibrate({"--calib", folder_ / "none.txt"}), {"none.txt"});
+  expect_error(calibrate({"--frames", "0:2", "--quiet"}), 1, {sequence_.string(), "2 frames"});
+  expect_error(calibrate({"--calib", folder_ / "none.txt"}), 1, {"none.txt"});
   const std::string other = folder_ / "other.txt";
   write_camera(other, 1000.0, 2000.0, 100.0);
-  expect_error(calibrate({"--calib", other}), {"other.txt", "620x188", "2000"});
-  expect_error(run_stemvo({"run", sequence_.string(), "--out", folder_ / "o", "--calib", other}),
+  expect_error(calibrate({"--calib", other}), 1, {"other.txt", "620x188", "2000"});
+  expect_error(run_stemvo({"run", sequence_.string(), "--out", folder_ / "o", "--calib", other}), 1,
                {"other.txt", "620x188"});
   fs::copy_file(sequence_ / "calib.txt", out_);
-  expect_error(calibrate({"--calib", out_}), {out_, "no input"});
+  expect_error(calibrate({"--calib", out_}), 1, {out_, "no input"});
   fs::remove(out_);
-  expect_error(run_stemvo({"calibrate", folder_ / "none", "--out", out_}), {folder_ / "none"});
-  expect_error(run_stemvo({"calibrate", sequence_.string(), "--out", folder_.path().string()}),
+  expect_error(run_stemvo({"calibrate", folder_ / "none", "--out", out_}), 1, {folder_ / "none"});
+  expect_error(run_stemvo({"calibrate", sequence_.string(), "--out", folder_.path().string()}), 1,
                {folder_.path().string(), "folder"});
-  expect_error(run_stemvo({"calibrate", sequence_.string(), "--out", folder_ / "no/file.txt"}),
+  expect_error(run_stemvo({"calibrate", sequence_.string(), "--out", folder_ / "no/file.txt"}), 1,
                {"no/file.txt"});
   EXPECT_FALSE(fs::exists(out_));
 }

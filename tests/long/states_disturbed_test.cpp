@@ -16,6 +16,7 @@ class Disturbed : public ::testing::Test {
     sequence_ = folder_.path() / "sequences" / "00";
     fs::create_directories(sequence_.parent_path());
     fs::copy(from, sequence_, fs::copy_options::recursive);
+    num_frames_ = drive.world_from_camera.size();
   }
   [[nodiscard]] fs::path image_file(int frame) const { return sequence_ / image_name(frame); }
   void change(int from, int to, const std::function<void(int, cv::Mat&)>& edit) const {
@@ -26,10 +27,15 @@ class Disturbed : public ::testing::Test {
       ASSERT_TRUE(cv::imwrite(image_file(i).string(), image));
     }
   }
-  [[nodiscard]] StateRun run() const { return run_states(sequence_, "camera_height"); }
+  [[nodiscard]] StateRun run() const {
+    StateRun result = run_states(sequence_, "camera_height");
+    EXPECT_EQ(result.states.size(), num_frames_);
+    return result;
+  }
 
   TempFolder folder_;
   fs::path sequence_;
+  std::size_t num_frames_ = 0;
 };
 
 /// A thing with a texture of its own that goes from the left to the right: over a third of the
@@ -81,7 +87,6 @@ TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
   const int end = 34;
   change(begin, end, darkened(0.002));
   const StateRun result = run();
-  ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   // Two dark frames in a row have the same faint image: tracks between them are no map.
   result.expect_states(begin, end, {"lost", "no_image", "initializing"});
   result.expect_states(end, end + 5, {"lost", "initializing", "tracking"});
@@ -101,7 +106,6 @@ TEST_F(Disturbed, AFewDimFramesAreFollowed) {
   copy("steady", drive);
   change(30, 34, darkened(0.02));
   const StateRun result = run();
-  ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   result.expect_states(30, 60, {"tracking"});
   expect_accurate(result.poses, drive, 10, 60, 0.05, 0.3 * kDeg);
 }
@@ -113,7 +117,6 @@ TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
   change(drive.event_begin + 2, drive.event_end,
          [&](int i, cv::Mat& image) { passing.draw(i, image); });
   const StateRun result = run();
-  ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   result.expect_states(drive.event_begin, drive.event_end, {"stationary"});
   const auto begin = static_cast<std::size_t>(drive.event_begin);
   const auto end = static_cast<std::size_t>(drive.event_end);
@@ -131,7 +134,6 @@ TEST_F(Disturbed, WhoStandsOpensNoMapOnWhatHidesTheWorld) {
   const Passing passing(begin, 80, kImage, {1.2, 1.0});
   change(begin, drive.event_end, [&](int i, cv::Mat& image) { passing.draw(i, image); });
   const StateRun result = run();
-  ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   const int num_frames = static_cast<int>(result.poses.size());
   result.expect_states(drive.event_begin, num_frames,
                        {"stationary", "lost", "low_parallax", "rotating", "tracking"});
@@ -149,11 +151,34 @@ TEST_F(Disturbed, WhoDrivesGoesOnWhateverPassesBy) {
   const Passing passing(begin, 26, kImage);
   change(begin, end, [&](int i, cv::Mat& image) { passing.draw(i, image); });
   const StateRun result = run();
-  ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   result.expect_states(begin, 60, {"tracking"});
   expect_accurate(result.poses, drive, 10, 60, 0.1, 0.6 * kDeg);
   EXPECT_NEAR((result.poses[40].translation - result.poses[20].translation).norm(), 20 * kStep_m,
               0.05 * 20 * kStep_m);
+}
+
+TEST_F(Disturbed, WithoutARoadTheScaleIsHeldAndItsDoubtGrows) {
+  const StateDrive drive = standing_drive();
+  copy("standing", drive);
+  change(20, 35, [](int, cv::Mat& image) {  // something covers the lower part of the image
+    image.rowRange(image.rows * 52 / 100, image.rows).setTo(cv::Scalar(90, 90, 90));
+  });
+  const StateRun result = run();
+  for (std::size_t i = 15; i < 45; ++i) {
+    // Frame 35 still has only covered images behind it.
+    const bool is_covered = i >= 20 && i < 35;
+    if (i != 35) {
+      EXPECT_EQ(result.roads[i], is_covered ? "held" : "measured") << i;
+    }
+    if (is_covered && i > 20) {
+      EXPECT_GT(std::stod(result.sigmas[i]), std::stod(result.sigmas[i - 1])) << i;
+    }
+    if (i < 40) {
+      EXPECT_NEAR((result.poses[i].translation - result.poses[i - 1].translation).norm(), kStep_m,
+                  0.06 * kStep_m)
+          << i;
+    }
+  }
 }
 
 }  // namespace

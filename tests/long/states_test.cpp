@@ -79,37 +79,6 @@ TEST(States, CutToAnotherPlace) {
   EXPECT_NEAR(step_m(result.poses, cut), kDriveStep_m, 0.1 * kDriveStep_m);
 }
 
-TEST(RoadStates, WithoutARoadTheScaleIsHeldAndItsDoubtGrows) {
-  const TempFolder folder;
-  const StateDrive drive = standing_drive();
-  const fs::path from = rendered_along("standing", drive);
-  const fs::path sequence = folder.path() / "sequences" / "00";
-  fs::create_directories(sequence.parent_path());
-  fs::copy(from, sequence, fs::copy_options::recursive);
-  for (int i = 20; i < 35; ++i) {  // something covers the lower part of the image
-    const std::string name = image_name(i);
-    cv::Mat image = cv::imread((sequence / name).string(), cv::IMREAD_COLOR);
-    ASSERT_FALSE(image.empty());
-    image.rowRange(image.rows * 52 / 100, image.rows).setTo(cv::Scalar(90, 90, 90));
-    cv::imwrite((sequence / name).string(), image);
-  }
-  const StateRun result = run_states(sequence, "camera_height");
-  ASSERT_EQ(result.poses.size(), drive.world_from_camera.size());
-  for (std::size_t i = 15; i < 45; ++i) {
-    // Frame 35 still has only covered images behind it.
-    const bool is_covered = i >= 20 && i < 35;
-    if (i != 35) {
-      EXPECT_EQ(result.roads[i], is_covered ? "held" : "measured") << i;
-    }
-    if (is_covered && i > 20) {
-      EXPECT_GT(std::stod(result.sigmas[i]), std::stod(result.sigmas[i - 1])) << i;
-    }
-    if (i < 40) {
-      EXPECT_NEAR(step_m(result.poses, i), kDriveStep_m, 0.06 * kDriveStep_m) << i;
-    }
-  }
-}
-
 TEST(Walk, ACameraInTheHandIsFollowed) {
   const fs::path folder = render_walk_once(300);
   const StateRun result = run_states(folder / "sequences/00", "none");

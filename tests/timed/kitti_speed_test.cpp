@@ -26,11 +26,6 @@ class KittiSpeed : public NeedsClips {
   }
 };
 
-// Found: 12 ms.
-TEST_F(KittiSpeed, ProcessorTimePerFrameIsBounded) {
-  expect_processor_ms_per_frame({}, folder_ / "result", 30.0);
-}
-
 // 7 to 8 ms.
 TEST_F(KittiSpeed, ProcessorTimePerFrameOfPairsIsBounded) {
   expect_processor_ms_per_frame(
@@ -38,7 +33,7 @@ TEST_F(KittiSpeed, ProcessorTimePerFrameOfPairsIsBounded) {
       folder_ / "result", 20.0);
 }
 
-// 15 ms; t_rel of these frames at most 1.5 times the defaults'.
+// The defaults: 12 ms. The fast ones: 15 ms; t_rel of these frames at most 1.5 times the defaults'.
 TEST_F(KittiSpeed, FastYamlIsCheaperAndNearlyAsAccurate) {
   const std::string whole = folder_ / "defaults";
   const std::string fast = folder_ / "fast";
