@@ -100,19 +100,7 @@ def test_a_padded_layer_norm_does_not_fold(files):
     expect(files, files.save(random_arrays((4, 4), 4, norm="layer")), "expected --padding none", options=("--filter", "3", "--fold", "--padding", "1,1,1,1"))
 
 
-def test_damaged_files(files):
-    whole = files.save(random_arrays((3, 3), 2, norm="batch")).read_bytes()
-    damaged = files.folder / "damaged.npz"
-    for content in (b"", b"text", whole[:len(whole) // 2], whole[:300] + bytes(200) + whole[500:]):
-        damaged.write_bytes(content)
-        expect(files, damaged, "damaged.npz", "expected an .npz file")
-    expect(files, files.folder / "absent.npz", "found nothing")
-    expect(files, files.folder, "found no suffix")
-
-
 @pytest.mark.skipif("STEMVO_SHARED_DATA" not in os.environ, reason="STEMVO_SHARED_DATA is not set")
-
-
 def test_pretrained_stems(files):
     found = sorted(pathlib.Path(os.environ["STEMVO_SHARED_DATA"], "stems").glob("*.npz"))
     assert len(found) >= 3

@@ -160,14 +160,15 @@ def test_damaged_files(files):
     safetensors.numpy.save_file({"conv1.weight": np.zeros((64, 3, 7, 7), np.float32)}, tensors)
     keras = files.folder / "whole.h5"
     exporting.keras_named(keras, {"a": {"kernel": np.ones((9, 9))}}, ["a"])
-    contents = [b"", b"text", whole[:len(whole) // 2], tensors.read_bytes()[:99], keras.read_bytes()[:1000]]
-    for suffix in (".safetensors", ".h5", ".keras", ".onnx"):
+    stored = files.save(random_arrays((3, 3), 2, norm="batch")).read_bytes()
+    contents = [b"", b"text", stored[:len(stored) // 2], stored[:300] + bytes(200) + stored[500:], whole[:len(whole) // 2], tensors.read_bytes()[:99], keras.read_bytes()[:1000]]
+    for suffix in (".npz", ".safetensors", ".h5", ".keras", ".onnx"):
         for content in contents:
             damaged = files.folder / f"damaged{suffix}"
             damaged.write_bytes(content)
             assert "expected" in files.error_of(damaged, "--layers", "a", "--preprocessing", "none")
         assert "found nothing" in files.error_of(files.folder / f"absent{suffix}", "--layers", "a", "--preprocessing", "none")
-    assert "expected one of .npz, .onnx, .h5" in files.error_of(files.folder / "a.txt")
+    assert "expected one of .npz, .onnx, .h5" in files.error_of(files.folder / "a.txt") and "found no suffix" in files.error_of(files.folder)
 
 
 def test_a_pickle_is_told_how_to_convert_it(files):
