@@ -183,7 +183,7 @@ def drive(request, tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def clear(drive):
-    """Recordings and results of 134 cases would fill a small disk."""
+    """Recordings and results of 128 cases would fill a small disk."""
     before = set(drive.folder.iterdir())
     yield
     for folder in set(drive.folder.iterdir()) - before:
@@ -230,6 +230,7 @@ def camera_files(drive, model, k):
 
 
 @pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize("drive", ["rendered"], indirect=True, scope="module")  # a camera file is read alike for colours and gray
 def test_camera_files(drive, lens):
     model, k = LENSES[lens]
     recording = drive.put(drive.new(), lambda i: f"{i:06}.png")
