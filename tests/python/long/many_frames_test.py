@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""10,000 small frames (links to a few, there and back again): open files and time per frame do not grow, memory by what
+"""4,000 small frames (links to a few, there and back again): open files and time per frame do not grow, memory by what
 is kept of a frame: pose, row and landmarks. Without loops: what remembers a place that is seen again and again grows by 25 kB a
 keyframe still, and so does its graph."""
 
@@ -13,7 +13,7 @@ from drives import watched_run
 
 PROGRAM = os.environ["STEMVO_PROGRAM"]
 RENDERED = 100
-FRAMES = 10000
+FRAMES = 4000
 MAX_KB_PER_FRAME = 8.0
 MAX_FILES_FOR_A_MOMENT = 3
 
