@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Opens a report.html in Chromium without a network and prints as JSON what a reader finds.
 
-    look_at_report.py REPORT [SCREENSHOTS]       # SCREENSHOTS_1280.png, ..
+    look_at_report.py REPORT [--narrow] [SCREENSHOTS]       # SCREENSHOTS_1280.png, ..; --narrow: on the last of the screens alone
 
 Runs in the environment of `tools/setup.sh browser`.
 """
@@ -192,7 +192,7 @@ def use(page, found):
     found["scrolled_over_a_chart"] = page.evaluate("scrollY") - before
 
 
-def look(browser, report, screenshots):
+def look(browser, report, screens, screenshots):
     found = {"errors": [], "requests": [], "screens": {}}
     page = open_page(browser, report, found, viewport={"width": 1280, "height": 900}, color_scheme="light")
     found["title"] = page.title()
@@ -218,7 +218,7 @@ def look(browser, report, screenshots):
         use(page, found)
     page.close()
 
-    for width, height, touch in SCREENS:
+    for width, height, touch in screens:
         page = open_page(browser, report, found, viewport={"width": width, "height": height}, color_scheme="light", has_touch=touch, is_mobile=touch)
         seen = {"width": page.evaluate("document.documentElement.scrollWidth"), "titles_in_the_way": titles_in_the_way(page),
                 "hard_to_read": hard_to_read(page), "at_edges_of_spaces": pixels_at_edges_of_spaces(page), "map": sizes_of_map(page)}
@@ -247,7 +247,8 @@ def look(browser, report, screenshots):
 def main():
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=ARGUMENTS)
-        found = look(browser, pathlib.Path(sys.argv[1]).resolve(), sys.argv[2] if len(sys.argv) > 2 else None)
+        options = [word for word in sys.argv[2:] if word != "--narrow"]
+        found = look(browser, pathlib.Path(sys.argv[1]).resolve(), SCREENS[-1:] if "--narrow" in sys.argv else SCREENS, options[0] if options else None)
         browser.close()
     print(json.dumps(found, indent=1))
 

@@ -23,8 +23,8 @@ def call(*arguments):
     subprocess.run(list(map(str, [PROGRAM, *arguments])), check=True, capture_output=True)
 
 
-def look_at(report):
-    look = subprocess.run([BROWSER, ROOT / "tests/browser/look_at_report.py", report], capture_output=True, text=True, check=False)
+def look_at(report, *options):
+    look = subprocess.run([BROWSER, ROOT / "tests/browser/look_at_report.py", report, *options], capture_output=True, text=True, check=False)
     if look.returncode != 0:
         raise AssertionError(look.stderr)
     return json.loads(look.stdout)
@@ -72,7 +72,7 @@ class TestReportPage:
         shutil.copytree(self.folder / "drive/sequences/00/image_2", images)
         (self.folder / "camera.yaml").write_text("resolution: [620, 188]\nintrinsics: [359, 359, 303, 92]\ndistortion_model: none\nrate_hz: 10\n")
         call("run", images, "--camera", self.folder / "camera.yaml", "--out", self.folder / "plain_result", "--quiet")
-        found = look_at(self.folder / "plain_result/report.html")
+        found = look_at(self.folder / "plain_result/report.html", "--narrow")
         self.expect_a_sound_page(found)
         assert "Path from above" in found["headings"] and "Error over distance" not in found["headings"] and "Command" in found["headings"]
 
