@@ -15,6 +15,7 @@ if ((EUID != 0)) || ! command -v debootstrap >/dev/null; then
   exit 77
 fi
 mapfile -t PIP < <(env | grep '^PIP_' || true)
+PIP+=(PIP_NO_COMPILE=1)  # most modules are never imported
 inside() { chroot "$ROOT" /usr/bin/env -i "${PIP[@]}" PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@" </dev/null; }
 as_someone() { inside su someone -c "cd && $*"; }
 install() { inside apt-get install -y --no-install-recommends "$@" >"$WORK/apt.log" 2>&1 || { tail "$WORK/apt.log"; exit 1; }; }
