@@ -95,6 +95,42 @@ TEST(PlaceCheck, LandmarksThatAreNewHaveWrongDepths) {
   EXPECT_LT(turn_rad(loop->from_to, true_similarity()), 0.01);
 }
 
+/// So few corners of each look as they did that none tells anything alone.
+TEST(PlaceCheck, ThoseAroundAPlaceTellTogetherWhereTheCameraIs) {
+  DescribedPoints points = street();
+  const KeptKeyframe recent = points.see(kNewPose, kNewUnits, 0);
+  std::vector<KeptKeyframe> places;
+  std::vector<PlaceAround> around;
+  for (const int k : {0, 1, 2}) {
+    const Rigid3 pose = kOldPose * Rigid3(so3_exp({0.0, 0.02 * k, 0.0}), {0.1 * k, 0.0, 1.0 * k});
+    KeptKeyframe& place = places.emplace_back(points.see(pose, kOldUnits, 0));
+    int num_alike = 0;
+    for (std::size_t i = 0; i < place.corners.size(); ++i) {
+      const bool is_alike = place.corners[i].track_id % 3 == k && num_alike < 14;
+      num_alike += is_alike ? 1 : 0;
+      place.descriptors[i] = is_alike ? place.descriptors[i] : points.draw();
+    }
+  }
+  for (const KeptKeyframe& place : places) {
+    EXPECT_FALSE(check_place(view_of(place), view_of(recent)).has_value());
+    Similarity3 from_it(places[0].world_from_camera.inverse() * place.world_from_camera);
+    around.push_back({from_it, view_of(place)});
+  }
+  const auto expect = [&](std::size_t num, const PlaceView& seen) {
+    return expect_by_places(kitti_camera(), std::span(around).first(num), seen);
+  };
+  const auto expected = expect(3, view_of(recent));
+  ASSERT_TRUE(expected.has_value());
+  const Similarity3 found = expected->recent_from_old.inverse();
+  EXPECT_LT(turn_rad(found, true_similarity()), 0.01);
+  EXPECT_LT((found.translation - true_similarity().translation).norm(), 0.3);
+  EXPECT_NEAR(found.scale, true_similarity().scale, 0.1);
+  EXPECT_FALSE(expect(1, view_of(recent)).has_value());
+  DescribedPoints other = street(2);
+  const KeptKeyframe elsewhere = other.see(kNewPose, kNewUnits, 0);
+  EXPECT_FALSE(expect(3, view_of(elsewhere)).has_value());
+}
+
 /// A third of the image, and few of its corners, but where they were expected.
 TEST(PlaceCheck, WhatIsExpectedNeedsFewerCorners) {
   DescribedPoints points = street();

@@ -102,6 +102,21 @@ TEST(OdometryAnswers, AfterAResetAllIsAsNew) {
   }
 }
 
+TEST(OdometryAnswers, OneThatWasMovedFromIsAnErrorOrEmpty) {
+  Odometry odometry = create();
+  process(odometry, 0);
+  Odometry other = std::move(odometry);
+  EXPECT_THAT(message_of(odometry.process(small_frames().images[1], PixelOrder::kGray, 9.0)),
+              HasSubstr("moved from"));
+  odometry.reset();
+  odometry.set_log({});
+  EXPECT_TRUE(odometry.channel_image().empty());
+  EXPECT_THAT(odometry.tracked_points(), IsEmpty());
+  EXPECT_THAT(odometry.keyframes(), IsEmpty());
+  EXPECT_THAT(odometry.landmarks_since(0).landmarks, IsEmpty());
+  process(other, 1);
+}
+
 TEST(OdometryAnswers, TheLogSaysWhenTheMapWasOpened) {
   Odometry odometry = create();
   std::vector<std::string> lines;

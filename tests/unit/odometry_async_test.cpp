@@ -222,6 +222,17 @@ TEST_F(Async, AfterAResetTheWorldIsNew) {
   }
 }
 
+TEST_F(Async, OneThatWasMovedFromIsAnError) {
+  AsyncOdometry odometry = create(2);
+  const AsyncOdometry other = std::move(odometry);
+  EXPECT_THAT(message_of(push(odometry, 0)), HasSubstr("moved"));
+  EXPECT_THAT(message_of(odometry.finish()), HasSubstr("moved"));
+  EXPECT_THAT(message_of(odometry.reset()), HasSubstr("moved"));
+  EXPECT_FALSE(odometry.next());
+  EXPECT_TRUE(odometry.landmarks_since(0).landmarks.empty() && odometry.keyframes().empty() &&
+              odometry.tracked_points().empty() && odometry.channel_image().empty());
+}
+
 TEST_F(Async, IsDestroyedInTheMiddle) {
   for (const int threads : {1, 2}) {
     for (const std::size_t num_frames : {0U, 1U, 2U, 7U, 12U}) {

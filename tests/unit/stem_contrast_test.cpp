@@ -70,6 +70,22 @@ TEST(ContrastNormalization, NoContrastIsOneGrayAndForgotten) {
   EXPECT_EQ(cv::norm(before, after, cv::NORM_INF), 0.0);
 }
 
+TEST(ContrastNormalization, NotANumberHarmsNobodyElse) {
+  StemOptions options;
+  ContrastNormalization clean(options);
+  ContrastNormalization dirty(options);
+  const cv::Mat expected = clean.apply(ramp(0.0F, 10.0F)).pixels;
+  Channel broken = ramp(0.0F, 10.0F);
+  broken.values.at<float>(50, 50) = std::numeric_limits<float>::quiet_NaN();
+  broken.values.at<float>(50, 51) = std::numeric_limits<float>::infinity();
+  const cv::Mat found = dirty.apply(broken).pixels;
+  cv::Mat1b differs = expected != found;
+  differs.at<unsigned char>(50, 50) = 0;
+  differs.at<unsigned char>(50, 51) = 0;
+  EXPECT_EQ(cv::countNonZero(differs), 0);
+  EXPECT_EQ(found.at<unsigned char>(50, 50), 0);
+}
+
 /// What a low-pass channel shows of a street: bright above, dark below, blotches in between.
 cv::Mat1f blotches() {
   cv::Mat1f values(180, 600);
