@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include <fmt/ranges.h>
-#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/emitfromevents.h>
 
 #include "text/text_file.hpp"
 #include "try.hpp"
@@ -15,39 +15,8 @@
 namespace stemvo::config {
 namespace {
 
-/// Keys, and values, that had another name once.
-constexpr std::pair<std::string_view, std::string_view> kRenamed[] = {
-    {"odometry.standing_flow_px", "odometry.stationary_flow_px"},
-    {"refine.every", "ba.every_n_keyframes"},
-    {"refine.loss_px", "ba.loss_px"},
-    {"refine.max_iterations", "ba.max_iterations"},
-    {"refine.window", "window.num_keyframes"},
-    {"scale.constant_m", "scale.step_m"},
-    {"scale.joining", "scale.temporal_filter"},
-    {"scale.source=constant", "scale.source=constant_speed"},
-    {"stem.layer", "stem.model (a file holds one layer)"},
-    {"stem.stretch_high_percent", "stem.contrast_high_percent"},
-    {"stem.stretch_low_percent", "stem.contrast_low_percent"},
-    {"stem.stretch_memory", "stem.contrast_memory"},
-    {"stem.tracking_resolution=bicubic", "stem.tracking_resolution=input"},
-    {"stem.tracking_resolution=frame", "stem.tracking_resolution=input_zoomed"},
-    {"stem.upsample", "stem.tracking_resolution"},
-};
-
-std::string new_name(const std::string& name) {
-  for (const auto& [before, now] : kRenamed) {
-    if (before == name) {
-      return fmt::format("; its name is {} now", now);
-    }
-  }
-  return {};
-}
-
 bool is_section(std::string_view name, const std::vector<Key>& keys) {
-  return !name.empty() && (std::ranges::find(keys, name, &Key::section) != keys.end() ||
-                           std::ranges::any_of(kRenamed, [&](const auto& renamed) {
-                             return renamed.first.starts_with(std::string(name) + ".");
-                           }));
+  return !name.empty() && std::ranges::find(keys, name, &Key::section) != keys.end();
 }
 
 /// Pairs of letters that two names share, of all that they have: 0 to 1.
@@ -76,12 +45,7 @@ std::string like_name(const std::string& name, const std::vector<Key>& keys) {
 std::string unknown_key(std::string_view section,
                         const std::string& key,
                         const std::vector<Key>& keys) {
-  const std::string renamed = new_name(options::full_name(section, key));
-  if (!renamed.empty()) {
-    return "unknown key" + renamed;
-  }
-  const bool is_top =
-      section.empty() || std::ranges::find(keys, section, &Key::section) == keys.end();
+  const bool is_top = !is_section(section, keys);
   std::vector<std::string_view> known;
   for (const Key& other : keys) {
     const std::string_view name = is_top && !other.section.empty() ? other.section : other.key;
@@ -109,29 +73,14 @@ std::string_view kind_of(const YAML::Node& node) {
   }
 }
 
-/// Finds where documents begin: YAML::Load reads the first and leaves out others without a word.
-class DocumentLines final : public YAML::EventHandler {
+/// Finds where documents begin: YAML::Load reads the first and leaves out others without a word,
+/// and YAML::LoadAll never ends on some texts.
+class DocumentLines final : public YAML::EmitFromEvents {
  public:
-  std::vector<int> lines;
-
+  using YAML::EmitFromEvents::EmitFromEvents;
   void OnDocumentStart(const YAML::Mark& mark) override { lines.push_back(mark.line + 1); }
-  void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnScalar(const YAML::Mark&,
-                const std::string&,
-                YAML::anchor_t,
-                const std::string&) override {}
-  void OnSequenceStart(const YAML::Mark&,
-                       const std::string&,
-                       YAML::anchor_t,
-                       YAML::EmitterStyle::value) override {}
-  void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark&,
-                  const std::string&,
-                  YAML::anchor_t,
-                  YAML::EmitterStyle::value) override {}
-  void OnMapEnd() override {}
+
+  std::vector<int> lines;
 };
 
 }  // namespace
@@ -175,7 +124,8 @@ Expected<YAML::Node> parse_document(const std::string& text, std::string_view so
   try {
     std::istringstream stream(text);
     YAML::Parser parser(stream);
-    DocumentLines documents;
+    YAML::Emitter unused;
+    DocumentLines documents(unused);
     if (parser.HandleNextDocument(documents) && parser.HandleNextDocument(documents)) {
       return fail(fmt::format("{}:{}: not YAML: expected one document, found more behind it",
                               source, documents.lines.back()));
@@ -282,10 +232,7 @@ std::string read_key(std::string_view section,
     return unknown_key(section, key, keys);
   }
   found->is_given = true;
-  const std::string problem = found->read(value);
-  return problem.empty() || !value.IsScalar()
-             ? problem
-             : problem + new_name(fmt::format("{}={}", found->name(), value.Scalar()));
+  return found->read(value);
 }
 
 }  // namespace stemvo::config

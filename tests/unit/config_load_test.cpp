@@ -74,34 +74,6 @@ TEST_F(ConfigLoad, UnknownKeyNamesLineAndKnownKeys) {
   EXPECT_THAT(error_of("\nstm:\n  filter: 3\n"), EndsWith(", scale, seed, threads"));
 }
 
-TEST_F(ConfigLoad, ARenamedKeyNamesItsNewName) {
-  for (const auto& [old_name, new_name] : {std::pair("refine.window", "window.num_keyframes"),
-                                           {"refine.every", "ba.every_n_keyframes"},
-                                           {"refine.max_iterations", "ba.max_iterations"},
-                                           {"refine.loss_px", "ba.loss_px"},
-                                           {"scale.constant_m", "scale.step_m"},
-                                           {"scale.joining", "scale.temporal_filter"},
-                                           {"stem.upsample", "stem.tracking_resolution"},
-                                           {"stem.stretch_memory", "stem.contrast_memory"}}) {
-    const std::string name = old_name;
-    const std::string problem = fmt::format("{}: unknown key; its name is {} now", name, new_name);
-    const std::size_t dot = name.find('.');
-    EXPECT_EQ(error_of(name.substr(0, dot) + ":\n  " + name.substr(dot + 1) + ": 1\n"),
-              ":2: " + problem);
-    Config config;
-    EXPECT_EQ(apply_override(config, name + "=1").error().message, "--set " + problem);
-  }
-}
-
-TEST_F(ConfigLoad, ARenamedValueNamesItsNewName) {
-  EXPECT_THAT(error_of("scale:\n  source: constant\n"),
-              AllOf(StartsWith(":2: scale.source: expected one of auto, none, constant_speed, "),
-                    EndsWith("found 'constant'; its name is scale.source=constant_speed now")));
-  Config config;
-  EXPECT_THAT(apply_override(config, "stem.tracking_resolution=bicubic").error().message,
-              EndsWith("its name is stem.tracking_resolution=input now"));
-}
-
 TEST_F(ConfigLoad, DuplicatedKeyNamesBothLines) {
   EXPECT_THAT(error_of("stem:\n  filter: 3\n  filter: 4\n"),
               StartsWith(":3: stem.filter: duplicated key; it stands on line 2 already"));
