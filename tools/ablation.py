@@ -51,7 +51,6 @@ ROWS = (
     Row("the paper's recipe on the gray image", ("stem.model=gray", "stem.filter=-1", "stem.sampling_px=0"), PAPER),
     Row("road: dense alignment only", ("scale.estimators=dense",), scales=ROAD),
     Row("road: tracked points only", ("scale.estimators=points",), scales=ROAD),
-    Row("road: no temporal filter", ("scale.temporal_filter=false",), scales=ROAD),
 )
 
 

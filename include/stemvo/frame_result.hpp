@@ -23,7 +23,7 @@ enum class FrameState {
   kStationary,    ///< no flow
   kLowParallax,   ///< hardly any parallax: the position owes much to the motion before
   kRotating,      ///< the same while the camera turns
-  kGated,         ///< two_frame: rotation measured; the forward motion gate refused the direction
+  kGated,         ///< two_frame: the forward motion gate refused the motion
   kLost,          ///< nothing measured: the last motion is continued, and fades
   kNoImage,       ///< nothing to be seen: the same
 };

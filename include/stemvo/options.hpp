@@ -78,8 +78,8 @@ enum class Composition {
   kRight,  ///< R_c R
   kPaper,  ///< R R_c, as printed in eq. (12)
 };
-/// A step of mode two_frame that does not go forward loses this.
-enum class ForwardGate { kTranslation, kPaper /* its rotation too */, kOff };
+/// What a step of mode two_frame that does not go forward loses.
+enum class ForwardGate { kPaper /* translation and rotation */, kOff };
 
 /// Keys `odometry.*`.
 struct OdometryOptions {
@@ -126,7 +126,6 @@ struct ScaleOptions {
   double step_m = 1.0;            ///< per frame
   double camera_height_m = 1.65;  ///< above the road
   RoadEstimators estimators = RoadEstimators::kBoth;
-  bool temporal_filter = true;  ///< of the road's measurements
 };
 
 /// Everything that steers the odometry. Defaults stand here, once.

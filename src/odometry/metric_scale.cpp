@@ -20,7 +20,7 @@ constexpr double kTrack_px = 0.7;     ///< error of a track over the window
 }  // namespace
 
 MetricScale::MetricScale(const Options& config, std::optional<double> drift_sigma)
-    : filter_(drift_sigma.value_or(kScaleDrift), config.scale.temporal_filter) {
+    : filter_(drift_sigma.value_or(kScaleDrift)) {
   if (config.scale.source != ScaleSource::kCameraHeight) {
     return;
   }

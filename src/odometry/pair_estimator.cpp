@@ -11,39 +11,13 @@ namespace {
 constexpr double kSpeedSigma = 0.02;
 constexpr double kSpeedDrift = 0.063;  ///< .. and in a second
 
-/// Backward travel is believed only with this many times the least parallax and a clear winner of
-/// the hypothesis test; otherwise it is the cheirality test's flip of 180 degrees.
-constexpr double kReverseParallaxFactor = 3.0;
-constexpr double kReverseRunnerUp = 0.5;
-
 /// The paper's forward motion gate: T_z > T_x and T_z > T_y, T = prev_from_cur (signed, as
 /// printed).
 bool is_forward_in_paper(const Eigen::Vector3d& direction) {
   return direction.z() > direction.x() && direction.z() > direction.y();
 }
 
-bool is_mainly_along_z(const Eigen::Vector3d& direction) {
-  return std::abs(direction.z()) > std::abs(direction.x()) &&
-         std::abs(direction.z()) > std::abs(direction.y());
-}
-
 }  // namespace
-
-bool MotionChain::passes_gate(const Eigen::Vector3d& direction_in_prev,
-                              const MeasuredMotion& motion) const {
-  if (options_.gate == ForwardGate::kOff) {
-    return true;
-  }
-  if (options_.gate == ForwardGate::kPaper) {
-    return is_forward_in_paper(direction_in_prev);
-  }
-  if (!is_mainly_along_z(direction_in_prev)) {
-    return false;
-  }
-  return direction_in_prev.z() > 0.0 ||
-         (motion.parallax_px > kReverseParallaxFactor * options_.min_parallax_px &&
-          motion.runner_up_ratio < kReverseRunnerUp);
-}
 
 FrameState MotionChain::add(const MeasuredMotion& motion, double length) {
   const Rigid3 prev_from_cur = motion.cur_from_prev.inverse();
@@ -51,7 +25,7 @@ FrameState MotionChain::add(const MeasuredMotion& motion, double length) {
   const double full_length = length > 0.0 ? length : assumed_speed_ * since_image_s();
   FrameState state = motion.state;
   if (state == FrameState::kTracking) {
-    if (!passes_gate(direction, motion)) {
+    if (options_.gate == ForwardGate::kPaper && !is_forward_in_paper(direction)) {
       state = FrameState::kGated;
     } else if (is_initializing_) {
       state = FrameState::kInitializing;
@@ -70,11 +44,7 @@ FrameState MotionChain::add(const MeasuredMotion& motion, double length) {
             full_length * motion.parallax_px / options_.min_parallax_px);
       break;
     case FrameState::kGated:
-      if (options_.gate == ForwardGate::kPaper) {
-        apply({}, 0.0);
-      } else {
-        apply({prev_from_cur.rotation, last_direction_}, full_length);
-      }
+      apply({}, 0.0);
       break;
     case FrameState::kStationary:
     case FrameState::kRotating:

@@ -63,8 +63,6 @@ class MotionChain {
   [[nodiscard]] bool is_initializing() const { return is_initializing_; }
 
  private:
-  [[nodiscard]] bool passes_gate(const Eigen::Vector3d& direction_in_prev,
-                                 const MeasuredMotion& motion) const;
   void apply(const Rigid3& prev_from_cur, double length) {
     const Eigen::Vector3d step_in_prev = length * prev_from_cur.translation;
     const Eigen::Vector3d position =

@@ -46,11 +46,6 @@ bool ScaleFilter::update(double log_scale, double sigma, ScaleWitness witness) {
     sigma_ = std::max(sigma, kFirstSigma);
     return true;
   }
-  if (!joins_frames_) {
-    log_scale_ = log_scale;
-    sigma_ = sigma;
-    return true;
-  }
   const bool is_road = witness == ScaleWitness::kRoad;
   const double way_s = record(ScaleWitness::kWay).since_s;
   if (!is_road && record(ScaleWitness::kRoad).since_s > way_s) {

@@ -25,17 +25,15 @@ inline constexpr double kScaleDrift = 0.019;
 /// of time: neighbouring frames see the same road, so more of them tell no more.
 class ScaleFilter {
  public:
-  /// `drift_sigma`: of the random walk in a second. `joins_frames`: false where every measurement
-  /// is believed as it comes.
-  explicit ScaleFilter(double drift_sigma, bool joins_frames = true)
-      : drift_sigma_(drift_sigma), joins_frames_(joins_frames) {}
+  /// `drift_sigma`: of the random walk in a second.
+  explicit ScaleFilter(double drift_sigma) : drift_sigma_(drift_sigma) {}
 
   static constexpr double kUnknownSigma = 1.0;
 
   /// Time passes: the map may have drifted.
   void predict(double interval_s);
-  /// Returns whether the measurement was believed; always where frames are not joined. `sigma` of a
-  /// road: if it were measured ten times a second.
+  /// Returns whether the measurement was believed. `sigma` of a road: if it were measured ten times
+  /// a second.
   bool update(double log_scale, double sigma, ScaleWitness witness);
   /// The measurement's distance from the state, standard deviations; nullopt where there is none.
   [[nodiscard]] std::optional<double> innovation(double log_scale, double sigma) const {
@@ -45,7 +43,7 @@ class ScaleFilter {
     return (log_scale - log_scale_) / std::hypot(sigma, sigma_);
   }
   void shift(double log_factor) { log_scale_ += log_factor; }
-  void restart() { *this = ScaleFilter(drift_sigma_, joins_frames_); }
+  void restart() { *this = ScaleFilter(drift_sigma_); }
 
   [[nodiscard]] bool is_initialized() const { return is_initialized_; }
   [[nodiscard]] double log_scale() const { return log_scale_; }
@@ -65,7 +63,6 @@ class ScaleFilter {
   double judge(double innovation, double sigma, ScaleWitness witness);
 
   double drift_sigma_;
-  bool joins_frames_;
   bool is_initialized_ = false;
   double log_scale_ = 0.0;
   double sigma_ = kUnknownSigma;

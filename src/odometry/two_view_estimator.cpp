@@ -92,7 +92,6 @@ MeasuredMotion TwoViewEstimator::measure(const PixelPairs& pairs,
   }
   result.model = motion->model;
   result.cur_from_prev = motion->cur_from_prev;
-  result.runner_up_ratio = motion->runner_up_ratio;
   result.is_decisive = is_decisive(*motion, static_cast<int>(pairs.size()), kPairAcceptance);
   result.inlier_mask = std::move(motion->test.good_mask);
   refine(pairs, camera, result);

@@ -28,7 +28,6 @@ struct MeasuredMotion {
   double homography_ratio = 0.0;   ///< R_H
   double parallax_px = 0.0;        ///< median flow that no rotation explains
   bool is_decisive = false;        ///< enough points, parallax, and no close second hypothesis
-  double runner_up_ratio = 1.0;    ///< of the hypothesis test; near 1: a guess
   int num_inliers = 0;
   std::vector<char> inlier_mask;              ///< one per match
   std::vector<char> moving_mask;              ///< of an Initializer: it moves on its own

@@ -47,7 +47,7 @@ constexpr auto names_of(FeatureMethod) { return names("patch", "klt", "orb", "si
 constexpr auto names_of(RobustEstimator) { return names("magsac", "ransac"); }
 constexpr auto names_of(OdometryMode) { return names("two_frame", "map"); }
 constexpr auto names_of(Composition) { return names("right", "paper"); }
-constexpr auto names_of(ForwardGate) { return names("translation", "paper", "off"); }
+constexpr auto names_of(ForwardGate) { return names("paper", "off"); }
 constexpr auto names_of(CameraRefinement) { return names("off", "principal_point", "all"); }
 constexpr auto names_of(ScaleSource) { return names("none", "constant_speed", "camera_height"); }
 constexpr auto names_of(RoadEstimators) { return names("both", "dense", "points"); }
@@ -188,8 +188,8 @@ void visit(O& o, V&& v) {
   v("composition", o.composition, kAny,
     "two_frame: how steps are chained: right, R_c R; paper, R R_c as printed in eq. (12)");
   v("gate", o.gate, kAny,
-    "two_frame: what a step that does not go forward loses: its translation, paper: its rotation "
-    "too; off: nothing");
+    "two_frame: what a step that does not go forward loses: paper: its translation and rotation; "
+    "off: nothing");
   v("min_inliers", o.min_inliers, Rule::between(5, 100000), "fewer: the frame is lost");
   v("stationary_flow_px", o.stationary_flow_px, Rule::between(0, 1000),
     "median flow below it: stationary, input pixels");
@@ -236,8 +236,6 @@ void visit(O& o, V&& v) {
   v("estimators", o.estimators, kAny,
     "camera_height: what measures the road: dense (its image aligned), points (tracked corners; "
     "the first frames are dense all the same), or both");
-  v("temporal_filter", o.temporal_filter, kAny,
-    "camera_height: measurements are filtered over time; false: each frame's stands alone");
 }
 
 template <Is<Options> O, typename V>

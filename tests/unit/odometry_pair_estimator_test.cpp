@@ -14,7 +14,6 @@ MeasuredMotion driven(const Eigen::Vector3d& direction,
   motion.state = state;
   motion.cur_from_prev = Rigid3(so3_exp({0.0, yaw_deg * kDeg, 0.0}), direction).inverse();
   motion.parallax_px = 5.0;
-  motion.runner_up_ratio = 0.1;
   motion.is_decisive = true;
   return motion;
 }
@@ -80,22 +79,12 @@ TEST(MotionChain, InitializesUntilAMotionIsDecisive) {
   EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kTracking);
 }
 
-TEST(MotionChain, TheGateKeepsTheRotationAndGoesOnAndThePapersDropsBoth) {
-  for (const bool is_papers : {false, true}) {
-    Chain chain = make_chain({.gate = is_papers ? ForwardGate::kPaper : ForwardGate::kTranslation});
-    chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
-    EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitX(), 5.0)), FrameState::kGated);
-    EXPECT_NEAR(chain.world_from_camera().angle_rad(), is_papers ? 0.0 : 5.0 * kDeg, 1e-12);
-    EXPECT_NEAR(chain.world_from_camera().translation.z(), is_papers ? 1.0 : 2.0, 1e-12);
-  }
-}
-
-TEST(MotionChain, ReversingIsBelievedOnlyWhenTheEvidenceIsClear) {
-  Chain chain = make_chain({.gate = ForwardGate::kTranslation});
-  EXPECT_NE(chain.add(driven(-Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kGated);
-  MeasuredMotion doubtful = driven(-Eigen::Vector3d::UnitZ(), 0.0);
-  doubtful.runner_up_ratio = 0.9;
-  EXPECT_EQ(chain.add(doubtful), FrameState::kGated);
+TEST(MotionChain, ThePapersGateDropsTranslationAndRotation) {
+  Chain chain = make_chain({.gate = ForwardGate::kPaper});
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitX(), 5.0)), FrameState::kGated);
+  EXPECT_NEAR(chain.world_from_camera().angle_rad(), 0.0, 1e-12);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.0, 1e-12);
 }
 
 TEST(MotionChain, LowParallaxKeepsTheDirectionAndStationaryStays) {
