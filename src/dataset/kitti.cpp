@@ -152,18 +152,9 @@ Expected<int> choose_camera(const fs::path& directory, const std::string& option
     return option == "auto" ? index % 2 == 0 && is_there(index)
                             : option == fmt::format("image_{}", index);
   });
-  if (found == kOrder.end() && option != "auto") {
-    return fail(
-        fmt::format("input.camera: expected auto or image_0 .. image_3, found '{}'", option));
-  }
   if (found == kOrder.end() || !is_there(*found)) {
-    // Commands that read other recordings too open none of them as KITTI's.
-    const char* why = looks_like_kitti(directory)
-                          ? ""
-                          : "; this command reads KITTI's layout only (image_2/000000.png, .., "
-                            "calib.txt, times.txt), 'stemvo run' others too";
-    return fail(fmt::format("{}: expected a folder {}, found none{}", directory.string(),
-                            option == "auto" ? "image_2 or image_0" : option, why));
+    return fail(fmt::format("{}: expected a folder {}, found none", directory.string(),
+                            option == "auto" ? "image_2 or image_0" : option));
   }
   return *found;
 }
@@ -231,10 +222,6 @@ bool looks_like_kitti(const fs::path& folder) {
 }
 
 Expected<FrameSource> open_kitti(const fs::path& directory, const SequenceOptions& options) {
-  if (!dataset::is_folder(directory)) {
-    return fail(fmt::format("{}: expected a sequence folder, found none; check the path",
-                            directory.string()));
-  }
   STEMVO_TRY_GET(const auto camera_index, choose_camera(directory, options.camera));
   const fs::path image_folder = directory / fmt::format("image_{}", camera_index);
   STEMVO_TRY_GET(const auto images, list_images(image_folder));

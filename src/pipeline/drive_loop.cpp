@@ -171,11 +171,6 @@ class DriveLoop {
     if (stream.is_live) {
       drive_.interrupted = false;
     }
-    if (stream.num_counted() == 0 && run_.request.rate_hz) {
-      drive_.warnings.push_back(
-          fmt::format("{}: --rate {:g} is not used: the stream says when its frames were taken",
-                      run_.sequence.name, *run_.request.rate_hz));
-    }
     if (drive_.interrupted) {
       return;
     }
