@@ -114,12 +114,7 @@ Status write_kitti(const fs::path& from,
                    const Camera& given,
                    const fs::path& out_file,
                    CalibrationReport& report) {
-  const IntrinsicsDelta change = change_of(report);
-  report.refined = given;
-  report.refined.cx_px += change[0];
-  report.refined.cy_px += change[1];
-  report.refined.fx_px *= 1.0 + change[2];
-  report.refined.fy_px *= 1.0 + change[2];
+  report.refined = changed(given, change_of(report));
   const Expected<std::string> text = dataset::replace_kitti_camera(from, given, report.refined);
   return text ? write_text_file(out_file, *text) : Status(text.error());
 }
@@ -144,24 +139,18 @@ struct SeenRay {
 /// strong lens looks like tangential distortion.
 using LensDelta = Eigen::Matrix<double, 7, 1>;
 
-Camera changed(Camera camera, const LensDelta& by) {
-  camera.cx_px += by[0];
-  camera.cy_px += by[1];
-  camera.fx_px *= 1.0 + by[2];
-  camera.fy_px *= 1.0 + by[2];
-  camera.distortion_coefficients[0] += by[3];
-  camera.distortion_coefficients[1] += by[4];
-  camera.distortion_coefficients[2] += by[5];
-  camera.distortion_coefficients[3] += by[6];
+Camera changed_lens(const Camera& lens, const LensDelta& by) {
+  Camera camera = changed(lens, by.head<5>());
+  for (int i = 0; i < 4; ++i) {
+    camera.distortion_coefficients[static_cast<std::size_t>(i)] += by[3 + i];
+  }
   return camera;
 }
 
 std::vector<SeenRay> seen_rays(const Camera& lens,
                                const Camera& view,
                                const IntrinsicsDelta& change) {
-  LensDelta of_view = LensDelta::Zero();
-  of_view.head<5>() = change;
-  Camera truth = changed(view, of_view);
+  Camera truth = changed(view, change);
   truth.distortion = Distortion::kRadialTangential;
   truth.distortion_coefficients = {change[3], change[4]};
   std::vector<SeenRay> rays;
@@ -262,10 +251,10 @@ Camera refined_lens(const Camera& lens, const Camera& view, const IntrinsicsDelt
     Eigen::Matrix<double, Eigen::Dynamic, 7> jacobian(errors.size(), 7);
     constexpr double kStep = 1e-6;
     for (int c = 0; c < 7; ++c) {
-      const Camera moved = changed(fitted, kStep * LensDelta::Unit(c));
+      const Camera moved = changed_lens(fitted, kStep * LensDelta::Unit(c));
       jacobian.col(c) = (errors_of(moved, rays) - errors) / kStep;
     }
-    fitted = changed(fitted, -jacobian.colPivHouseholderQr().solve(errors));
+    fitted = changed_lens(fitted, -jacobian.colPivHouseholderQr().solve(errors));
   }
   const double size = static_cast<double>(lens.width_px) / working.width_px;
   Camera result = fitted;

@@ -44,10 +44,7 @@ void copy(const NormalEquations::Block<kColumns>& from,
 }
 
 void move_camera(const IntrinsicsDelta& change, Bundle& bundle) {
-  bundle.camera.cx_px += change[0];
-  bundle.camera.cy_px += change[1];
-  bundle.camera.fx_px *= 1.0 + change[2];
-  bundle.camera.fy_px *= 1.0 + change[2];
+  bundle.camera = changed(bundle.camera, change);
   bundle.radial += change.tail<2>();
 }
 

@@ -47,6 +47,14 @@ using IntrinsicsDelta = Eigen::Matrix<double, 5, 1>;
   rest[2] /= 1.0 + first[2];
   return rest;
 }
+/// k1 and k2 are left: a camera of frames without distortion has none.
+[[nodiscard]] inline Camera changed(Camera camera, const IntrinsicsDelta& by) {
+  camera.cx_px += by[0];
+  camera.cy_px += by[1];
+  camera.fx_px *= 1.0 + by[2];
+  camera.fy_px *= 1.0 + by[2];
+  return camera;
+}
 using CameraInformation = Eigen::Matrix<double, 5, 5>;
 
 /// The camera as several bundles tell it.

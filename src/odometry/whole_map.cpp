@@ -102,10 +102,7 @@ void WholeMap::take_in(const MapAdjustment& adjusted) {
     return;
   }
   const IntrinsicsDelta& change = adjusted.camera.change;
-  camera.cx_px += change[0];
-  camera.cy_px += change[1];
-  camera.fx_px *= 1.0 + change[2];
-  camera.fy_px *= 1.0 + change[2];
+  camera = changed(camera, change);
   camera_sigma = adjusted.camera.sigma;
   for (KeptKeyframe& keyframe : kept.keyframes) {
     if (keyframe.frame < 0) {
