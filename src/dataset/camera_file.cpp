@@ -10,6 +10,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "config/config_yaml.hpp"
+#include "evaluation/trajectory.hpp"
 #include "geometry/distortion.hpp"
 #include "odometry/check_frame.hpp"
 #include "text/text_file.hpp"
@@ -362,15 +363,11 @@ class Reader {
       return refuse(key, fmt::format("expected a last row 0, 0, 0, 1, found {}",
                                      fmt::join(numbers.end() - 4, numbers.end(), ", ")));
     }
-    const Matrix34d matrix =
-        Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
-    const Eigen::Matrix3d rotation = matrix.leftCols<3>();
-    constexpr double kTolerance = 1e-3;
-    if (!(rotation.transpose() * rotation).isIdentity(kTolerance) || rotation.determinant() < 0.0) {
-      return refuse(key, "expected a rotation in the first three columns, found none");
+    const Expected<Rigid3> transform = pose_from_rows(numbers);
+    if (!transform) {
+      return refuse(key, transform.error().message);
     }
-    const Rigid3 transform = Rigid3::from_matrix(matrix);
-    body_from_camera = key == kKalibr.body ? transform.inverse() : transform;
+    body_from_camera = key == kKalibr.body ? transform->inverse() : *transform;
   }
 
   std::filesystem::path file_;

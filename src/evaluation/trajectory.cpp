@@ -112,23 +112,6 @@ struct TimedPose {
 /// Entries of R^T R, or the length of a quaternion, may differ this much from the exact ones.
 constexpr double kRotationTolerance = 1e-3;
 
-Expected<TimedPose> pose_from_matrix_row(const std::vector<double>& numbers) {
-  const Matrix34d matrix =
-      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
-  const Eigen::Matrix3d rotation = matrix.leftCols<3>();
-  const double deviation =
-      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!(deviation <= kRotationTolerance)) {
-    return fail(fmt::format(
-        "expected a rotation in the first three columns, found R^T R off the identity by {:.3g}",
-        deviation));
-  }
-  if (rotation.determinant() < 0.0) {
-    return fail("expected a rotation in the first three columns, found a reflection");
-  }
-  return TimedPose{0.0, Rigid3::from_matrix(matrix)};
-}
-
 Expected<TimedPose> pose_from_quaternion_row(const std::vector<double>& n) {
   const Eigen::Quaterniond rotation(n[7], n[4], n[5], n[6]);
   if (!(std::abs(rotation.norm() - 1.0) <= kRotationTolerance)) {
@@ -156,7 +139,9 @@ Expected<TimedPose> parse_row(Format format, std::string_view given) {
   const bool has_commas = format != Format::kKitti || std::ranges::count(given, ',') == 11;
   const std::string line = has_commas ? with_blanks(given) : std::string(given);
   if (format == Format::kKitti) {
-    return parse_numbers(line, 12).and_then(pose_from_matrix_row);
+    return parse_numbers(line, 12).and_then(pose_from_rows).map([](const Rigid3& pose) {
+      return TimedPose{0.0, pose};
+    });
   }
   return (format == Format::kEuroc
               ? to_tum_row(line).and_then([](const auto& row) { return parse_numbers(row, 8); })
@@ -248,6 +233,23 @@ std::size_t nearest(std::span<const double> times_s, double time_s) {
 }
 
 }  // namespace
+
+Expected<Rigid3> pose_from_rows(const std::vector<double>& numbers) {
+  const Matrix34d matrix =
+      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
+  const Eigen::Matrix3d rotation = matrix.leftCols<3>();
+  const double deviation =
+      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(deviation <= kRotationTolerance)) {
+    return fail(fmt::format(
+        "expected a rotation in the first three columns, found R^T R off the identity by {:.3g}",
+        deviation));
+  }
+  if (rotation.determinant() < 0.0) {
+    return fail("expected a rotation in the first three columns, found a reflection");
+  }
+  return Rigid3::from_matrix(matrix);
+}
 
 Trajectory relative_to_first(std::span<const Rigid3> world_from_camera) {
   Trajectory moved;

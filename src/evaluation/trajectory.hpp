@@ -14,6 +14,9 @@ namespace stemvo {
 /// Poses world_from_camera, one per frame; metres.
 using Trajectory = std::vector<Rigid3>;
 
+/// [R | t] of 12 numbers, row by row, or of the first of more. Error: R is no rotation.
+[[nodiscard]] Expected<Rigid3> pose_from_rows(const std::vector<double>& numbers);
+
 /// A line of a KITTI pose file, and of a TUM one.
 [[nodiscard]] std::string kitti_row(const Rigid3& world_from_camera);
 [[nodiscard]] std::string tum_row(double timestamp_s, const Rigid3& world_from_camera);
