@@ -2,12 +2,9 @@
 #pragma once
 
 #include <array>
-#include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
-
-#include "stemvo/error.hpp"
 
 namespace stemvo {
 
@@ -17,13 +14,8 @@ struct Marker {
   std::array<cv::Point2f, 4> corners;
 };
 
-/// Finds markers of one of OpenCV's dictionaries, with black borders one or two bits wide. What
-/// does it is src/marker_module, loaded when it is asked for: few need OpenCV's contributed
-/// modules. Errors: the module or OpenCV's library is not there; no such dictionary.
-[[nodiscard]] Expected<std::vector<Marker>> find_markers(const cv::Mat& gray,
-                                                         const std::string& dictionary);
-
-/// The module's only symbol. False: no such dictionary.
+/// The only symbol of src/marker_module, which few need: OpenCV's contributed modules. False: no
+/// such dictionary.
 extern "C" using FindMarkers =
     bool(const cv::Mat& gray, const char* dictionary, std::vector<Marker>& markers);
 inline constexpr const char* kFindMarkers = "stemvo_find_markers";

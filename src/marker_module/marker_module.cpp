@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Loaded by calibration/markers.cpp; the only source that calls OpenCV's finder of markers.
+// Loaded by calibration/board.cpp; the only source that calls OpenCV's finder of markers.
 #include <algorithm>
 #include <iterator>
 #include <string_view>
