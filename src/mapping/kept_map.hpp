@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -113,5 +114,27 @@ struct KeptMap {
   }
   return frames;
 }
+
+/// The motion by one edge and another behind it: a.to is b.from.
+[[nodiscard]] MapEdge chained(const MapEdge& a, const MapEdge& b);
+/// The same edge from its other end.
+[[nodiscard]] MapEdge reversed(const MapEdge& edge);
+
+/// Merges keyframes between two that were recognized, without a new place in between, into the
+/// places that they show: a camera that stays in a room adds no nodes, edges and corners for ever.
+/// Each leaves its pose relative to the place; edges to the others that stay go on from there.
+/// Keyframes from number `end` on are in use still. Returns the new number of each keyframe, -1 for
+/// those that are none any more; empty: nothing was worth it.
+[[nodiscard]] std::vector<int> merge_known_terrain(KeptMap& map, int end);
+
+/// Where each frame is in the map: map_from_camera, whose lengths are those of the frame's pose in
+/// the trajectory. A frame goes with the keyframes on both sides of it, more with the nearer in
+/// time; one before the first or behind the last with that one alone, and with the one before where
+/// the trajectory jumps to the next. Keyframes whose frame is below 0 are of another recording.
+/// Without any the map is the trajectory's world.
+/// `world_from_camera`, `times_s`: of all frames.
+[[nodiscard]] std::vector<Similarity3> place_trajectory(std::span<const Rigid3> world_from_camera,
+                                                        std::span<const double> times_s,
+                                                        const KeptMap& map);
 
 }  // namespace stemvo

@@ -10,7 +10,6 @@
 
 #include "geometry/median.hpp"
 #include "geometry/pose_influence.hpp"
-#include "mapping/map_merge.hpp"
 #include "odometry/localization.hpp"
 
 namespace stemvo {

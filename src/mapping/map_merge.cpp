@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "mapping/map_merge.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -8,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "mapping/kept_map.hpp"
 #include "mapping/pose_graph.hpp"
 
 namespace stemvo {

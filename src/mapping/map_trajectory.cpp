@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "mapping/map_trajectory.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <iterator>
 
 #include "internal_check.hpp"
+#include "mapping/kept_map.hpp"
 
 namespace stemvo {
 namespace {

@@ -15,7 +15,6 @@
 #include <ceres/rotation.h>
 
 #include "internal_check.hpp"
-#include "mapping/map_merge.hpp"
 #include "odometry/scale_filter.hpp"
 
 namespace stemvo {

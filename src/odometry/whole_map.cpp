@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "geometry/radial_lens.hpp"
-#include "mapping/map_trajectory.hpp"
 #include "mapping/pose_graph.hpp"
 #include "odometry/self_calibration.hpp"
 

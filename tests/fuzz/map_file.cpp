@@ -5,7 +5,6 @@
 #include <string_view>
 
 #include "fuzz_input.hpp"
-#include "mapping/map_trajectory.hpp"
 
 namespace {
 

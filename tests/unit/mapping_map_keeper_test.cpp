@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "mapping/map_keeper.hpp"
-#include "mapping/map_merge.hpp"
-#include "mapping/map_trajectory.hpp"
 #include "mapping/pose_graph.hpp"
 #include "support/small_map.hpp"
 #include "support/test.hpp"

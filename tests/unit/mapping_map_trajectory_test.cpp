@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "mapping/map_trajectory.hpp"
+#include "mapping/kept_map.hpp"
 #include "support/matchers.hpp"
 #include "support/test.hpp"
 
