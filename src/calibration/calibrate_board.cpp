@@ -162,11 +162,9 @@ Status write_files(const BoardRequest& request, const cv::Size& size, BoardRepor
 
 Expected<BoardReport> calibrate_board(const BoardRequest& request, const RunProgress& progress) {
   STEMVO_TRY(check_can_write(request.out_file));
-  std::error_code code;
-  const auto look =
-      fs::is_regular_file(request.pictures, code) && !dataset::is_image_file(request.pictures)
-          ? look_at_video
-          : look_at_images;
+  const auto look = dataset::is_file(request.pictures) && !dataset::is_image_file(request.pictures)
+                        ? look_at_video
+                        : look_at_images;
   BoardReport report;
   STEMVO_TRY_GET(const cv::Size size, look(request, progress, report));
   if (report.interrupted) {

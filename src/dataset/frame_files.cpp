@@ -89,6 +89,11 @@ double rate_of(const CameraFile& camera, const FrameSourceRequest& request, Fram
 
 }  // namespace
 
+bool is_file(const fs::path& path) {
+  std::error_code code;
+  return fs::is_regular_file(path, code);
+}
+
 bool is_folder(const fs::path& path) {
   std::error_code code;
   return fs::is_directory(path, code);

@@ -26,6 +26,7 @@
 /// Parts that all frame sources share.
 namespace stemvo::dataset {
 
+[[nodiscard]] bool is_file(const std::filesystem::path& path);
 [[nodiscard]] bool is_folder(const std::filesystem::path& path);
 /// Without a trailing separator, so that its last part is the folder's name.
 [[nodiscard]] std::filesystem::path absolute_folder(const std::filesystem::path& folder);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <regex>
-#include <system_error>
 
 #include <fmt/format.h>
 
@@ -16,16 +15,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_file(const fs::path& path) {
-  std::error_code code;
-  return fs::is_regular_file(path, code);
-}
-
 /// A file or folder that `python -m stemvo.bag` reads.
 bool is_bag(const fs::path& path) {
   const fs::path kind = path.extension();
-  return is_file(path) ? kind == ".bag" || kind == ".mcap" || kind == ".db3"
-                       : is_file(path / "metadata.yaml");
+  return dataset::is_file(path) ? kind == ".bag" || kind == ".mcap" || kind == ".db3"
+                                : dataset::is_file(path / "metadata.yaml");
 }
 
 Error refuse(const fs::path& path) {
@@ -160,7 +154,7 @@ std::string dataset::without_secrets(const std::string& text) {
 
 bool dataset::is_address(const fs::path& path) {
   constexpr std::string_view kKinds[] = {"rtsp://", "rtsps://", "http://", "https://"};
-  return !is_file(path) && std::ranges::any_of(kKinds, [text = path.string()](auto kind) {
+  return !dataset::is_file(path) && std::ranges::any_of(kKinds, [text = path.string()](auto kind) {
     return text.starts_with(kind);
   });
 }
@@ -187,10 +181,11 @@ Config dataset::with_camera_height(Config config, const FrameSource& frames) {
 
 Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   const fs::path& path = request.sequence_dir;
-  if (is_file(path) && (is_bag(path) || dataset::is_image_file(path))) {
+  if (dataset::is_file(path) && (is_bag(path) || dataset::is_image_file(path))) {
     return refuse(path);
   }
-  const bool is_stream = dataset::camera_number(path) || dataset::is_address(path) || is_file(path);
+  const bool is_stream =
+      dataset::camera_number(path) || dataset::is_address(path) || dataset::is_file(path);
   const auto listing = is_stream ? std::nullopt : find_listing(request);
   if (!is_stream && !listing && !dataset::is_folder(path)) {
     return refuse(path);

@@ -115,10 +115,7 @@ bool matches_pattern(const std::string& name, const std::string& pattern) {
   return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
 }
 
-bool is_image_file(const fs::path& file) {
-  std::error_code code;
-  return has_image_name(file) && fs::is_regular_file(file, code);
-}
+bool is_image_file(const fs::path& file) { return has_image_name(file) && is_file(file); }
 
 bool is_pattern(const fs::path& path) {
   std::error_code code;
