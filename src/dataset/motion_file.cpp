@@ -2,7 +2,6 @@
 #include "dataset/motion_file.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <regex>
 
 #include <fmt/format.h>

@@ -2,7 +2,6 @@
 #include "features/point_front_end.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <utility>
 

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <numeric>
 #include <unordered_map>
-#include <utility>
 
 #include "mapping/pose_graph.hpp"
 

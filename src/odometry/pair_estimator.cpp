@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/pair_estimator.hpp"
 
-#include <cmath>
 #include <cstddef>
 
 namespace stemvo {

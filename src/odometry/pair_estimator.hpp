@@ -3,7 +3,6 @@
 
 #include <limits>
 #include <optional>
-#include <vector>
 
 #include <Eigen/Core>
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "geometry/median.hpp"
 #include "geometry/two_view_models.hpp"

@@ -2,7 +2,6 @@
 #include "text/text_table.hpp"
 
 #include <algorithm>
-#include <iomanip>
 
 #include <fmt/format.h>
 

@@ -2,7 +2,6 @@
 #include "odometry/road/image.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include <opencv2/imgproc.hpp>
 
