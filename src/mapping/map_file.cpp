@@ -169,15 +169,16 @@ void MapReader::count(List& list) {
   list.resize(is_cut_ ? 0 : size);
 }
 
-// Conditions of a map that is read. Each gives what was expected where it does not, else "".
+// Conditions of a map that is read: what is used as an index is inside, what is computed with is
+// finite.
 
-bool is_motion(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
+bool is_sound(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
   constexpr double kRounding = 1e-9;
   return translation.allFinite() && std::abs(rotation.norm() - 1.0) < kRounding;
 }
 
-bool is_similarity(const Similarity3& a) {
-  return a.scale > 0.0 && std::isfinite(a.scale) && is_motion(a.rotation, a.translation);
+bool is_sound(const Similarity3& a) {
+  return a.scale > 0.0 && std::isfinite(a.scale) && is_sound(a.rotation, a.translation);
 }
 
 /// Whether the list has an element of this number.
@@ -188,85 +189,53 @@ bool is_number(std::int64_t frame_or_track) {
   return std::abs(frame_or_track) <= kMax;
 }
 
-bool is_corner(const KeptCorner& corner) {
+bool is_sound(const KeptCorner& corner) {
   return is_number(corner.track_id) && corner.uv.allFinite() &&
          (!corner.has_landmark() || corner.in_camera.allFinite());
 }
 
-std::string_view flaw_of(const KeptKeyframe& keyframe) {
-  return !is_number(keyframe.frame)        ? "a frame's number"
-         : !std::isfinite(keyframe.time_s) ? "a finite time"
-         : !check_camera(keyframe.camera) || !(keyframe.radial.lpNorm<Eigen::Infinity>() < 0.5)
-             ? "a camera"
-         : !is_motion(keyframe.world_from_camera.rotation, keyframe.world_from_camera.translation)
-             ? "a pose"
-         : !std::ranges::all_of(keyframe.corners, is_corner) ? "finite corners"
-         : !std::ranges::is_sorted(keyframe.corners, {}, &KeptCorner::track_id)
-             ? "corners in the order of their tracks"
-         : !keyframe.descriptors.empty() && keyframe.descriptors.size() != keyframe.corners.size()
-             ? "no descriptors or one per corner"
-             : "";
+bool is_sound(const KeptKeyframe& keyframe) {
+  const auto& [rotation, translation] = keyframe.world_from_camera;
+  const auto& corners = keyframe.corners;
+  return is_number(keyframe.frame) && std::isfinite(keyframe.time_s) &&
+         check_camera(keyframe.camera) && keyframe.radial.lpNorm<Eigen::Infinity>() < 0.5 &&
+         is_sound(rotation, translation) &&
+         std::ranges::all_of(
+             corners, [](const auto& one) { return is_sound(one); }) &&
+         std::ranges::is_sorted(corners, {}, &KeptCorner::track_id) &&
+         (keyframe.descriptors.empty() || keyframe.descriptors.size() == corners.size());
 }
 
-std::string_view flaw_of(const MapEdge& edge, const KeptMap& map) {
-  const auto is_sigma = [](double sigma) { return sigma > 0.0; };
-  return !holds(map.keyframes, edge.from) || !holds(map.keyframes, edge.to) || edge.from == edge.to
-             ? "two keyframes"
-         : !is_similarity(edge.from_to) ? "a similarity"
-         : !is_sigma(edge.sigma_rad) || !is_sigma(edge.sigma_translation) ||
-                 !is_sigma(edge.sigma_log_scale)
-             ? "standard deviations"
-             : "";
+bool is_sound(const MapEdge& edge, const KeptMap& map) {
+  return holds(map.keyframes, edge.from) && holds(map.keyframes, edge.to) && edge.from != edge.to &&
+         is_sound(edge.from_to) && edge.sigma_rad > 0.0 && edge.sigma_translation > 0.0 &&
+         edge.sigma_log_scale > 0.0;
 }
 
-std::string_view flaw_of(const Loop& loop, const KeptMap& map) {
-  const std::string_view flaw = flaw_of(static_cast<const MapEdge&>(loop), map);
-  if (!flaw.empty()) {
-    return flaw;
-  }
-  const auto are_corners = [&](const auto& pair) {
-    return holds(map.keyframes[slot(loop.from)].corners, pair.first) &&
-           holds(map.keyframes[slot(loop.to)].corners, pair.second);
-  };
-  return std::ranges::all_of(loop.corners, are_corners) ? "" : "corners of its keyframes";
+bool is_sound(const Loop& loop, const KeptMap& map) {
+  return is_sound(static_cast<const MapEdge&>(loop), map) &&
+         std::ranges::all_of(loop.corners, [&](const auto& pair) {
+           return holds(map.keyframes[slot(loop.from)].corners, pair.first) &&
+                  holds(map.keyframes[slot(loop.to)].corners, pair.second);
+         });
 }
 
-std::string_view flaw_of(const MapLength& length, const KeptMap& map) {
-  return !holds(map.keyframes, length.keyframe) ? "a keyframe"
-         : !std::isfinite(length.log_metres_per_unit) || !(length.sigma > 0.0)
-             ? "a length and its sigma"
-             : "";
+bool is_sound(const MapLength& length, const KeptMap& map) {
+  return holds(map.keyframes, length.keyframe) && std::isfinite(length.log_metres_per_unit) &&
+         length.sigma > 0.0;
 }
 
-/// The first of the list's that has a flaw.
-Status check_each(const char* name, const auto& list, const auto& flaw_of_one) {
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    if (const std::string_view flaw = flaw_of_one(list[i]); !flaw.empty()) {
-      return fail(fmt::format("{} {}: expected {}, found something else", name, i, flaw));
-    }
-  }
-  return {};
-}
-
-Status check_map(const KeptMap& map) {
-  const auto& keyframes = map.keyframes;
-  if (map.map_from_keyframe.size() != keyframes.size()) {
-    return fail(fmt::format("expected a place for each of {} keyframes, found {}", keyframes.size(),
-                            map.map_from_keyframe.size()));
-  }
-  const auto is_not_after = [](const auto& a, const auto& b) { return a.frame >= b.frame; };
-  if (std::ranges::adjacent_find(keyframes, is_not_after) != keyframes.end()) {
-    return fail("expected keyframes in the order of their frames, found others");
-  }
-  const auto in_map = [&](const auto& one) { return flaw_of(one, map); };
-  return check_each("keyframe", keyframes, [](const auto& one) { return flaw_of(one); })
-      .and_then([&] {
-        return check_each("place of keyframe", map.map_from_keyframe,
-                          [](const auto& one) { return is_similarity(one) ? "" : "a similarity"; });
-      })
-      .and_then([&] { return check_each("motion", map.motions, in_map); })
-      .and_then([&] { return check_each("loop", map.loops, in_map); })
-      .and_then([&] { return check_each("length", map.lengths, in_map); });
+bool is_sound(const KeptMap& map) {
+  const auto is_one_sound = [](const auto& one) { return is_sound(one); };
+  const auto is_sound_in_map = [&](const auto& one) { return is_sound(one, map); };
+  return map.map_from_keyframe.size() == map.keyframes.size() &&
+         std::ranges::adjacent_find(map.keyframes, std::ranges::greater_equal(),
+                                    &KeptKeyframe::frame) == map.keyframes.end() &&
+         std::ranges::all_of(map.keyframes, is_one_sound) &&
+         std::ranges::all_of(map.map_from_keyframe, is_one_sound) &&
+         std::ranges::all_of(map.motions, is_sound_in_map) &&
+         std::ranges::all_of(map.loops, is_sound_in_map) &&
+         std::ranges::all_of(map.lengths, is_sound_in_map);
 }
 
 /// The head of a file, behind its magic.
@@ -295,13 +264,12 @@ Expected<std::string_view> unseal(std::string_view bytes) {
         fmt::format("expected a map of version {}, found version {}", kVersion, header.version));
   }
   bytes.remove_prefix(std::min(kHeaderBytes, bytes.size()));
-  if (header.num_bytes != bytes.size()) {
-    return fail(fmt::format("expected {} bytes behind the header, found {}: the map is cut",
-                            header.num_bytes, bytes.size()));
-  }
-  if (const std::uint64_t sum = checksum(bytes); header.sum != sum) {
-    return fail(fmt::format("expected checksum {:016x}, found {:016x}: the map is damaged",
-                            header.sum, sum));
+  if (const std::uint64_t sum = checksum(bytes);
+      header.num_bytes != bytes.size() || header.sum != sum) {
+    return fail(
+        fmt::format("expected {} bytes of checksum {:016x}, found {} of {:016x}: the map "
+                    "is cut or damaged",
+                    header.num_bytes, header.sum, bytes.size(), sum));
   }
   return bytes;
 }
@@ -310,10 +278,11 @@ Expected<MapFile> parse(std::string_view contents) {
   MapReader reader(contents);
   MapFile file;
   pass(reader, file);
-  if (!reader.has_read_all()) {
-    return fail("expected lists as long as they say, found an end before or behind theirs");
-  }
-  return check_map(file.map).map([&] { return std::move(file); });
+  return reader.has_read_all() && is_sound(file.map)
+             ? Expected<MapFile>(std::move(file))
+             : fail(
+                   "expected keyframes and what links them, found numbers that contradict each "
+                   "other: the map is damaged");
 }
 
 }  // namespace
