@@ -36,7 +36,7 @@ TEST(Model, WithoutMetadataTheCommandThatAddsThemIsNamed) {
   const std::string model = tiny_model("wrong_no_metadata");
   EXPECT_THAT(internal::open_model(model).error().message,
               AllOf(HasSubstr(model + ": expected metadata stemvo.network, found none"),
-                    HasSubstr("stemvo-lab export " + model)));
+                    HasSubstr("stemvo-lab export")));
 }
 
 /// Error of a model that says something else under a key.
@@ -88,7 +88,7 @@ TEST(Model, ALargerWindowThanTheGraphsIsRefused) {
   bytes = with_metadata(bytes, "kernel", "4 3");
   bytes = with_metadata(bytes, "padding", "1 1 2 1");
   EXPECT_THAT(internal::open_model(folder.file("changed.onnx", bytes).string()).error().message,
-              HasSubstr("found that the 3x1 pixels at 0, 3 of it do not matter"));
+              HasSubstr("found that pixels along one of its sides do not matter"));
 }
 
 std::string session_error(const std::string& name) {
