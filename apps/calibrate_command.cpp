@@ -21,11 +21,11 @@ camera.yaml, with the distortion. Turns tell of it, a straight road does not: a
 number that the recording does not determine stays as given and is marked.
 Ground truth is not read. Nothing uses FILE unless it is given to a run.
 
-With --board INPUT is pictures or a video of a printed board, and camera.yaml says
-all of the camera; what to photograph next is printed, what parts of the image lack is
-drawn beside it (camera_coverage.png). Boards:
-  9x6:0.025                            a chessboard: inner corners, side of a square (m)
-  charuco:7x5:0.04:0.03:DICT_5X5_100   squares, their side, markers' side, dictionary
+With --board INPUT is pictures or a video of a printed board, and camera.yaml
+says all of the camera; what to photograph next is printed, what parts of the
+image lack is drawn beside it (camera_coverage.png). Boards:
+  9x6:0.025                            a chessboard: inner corners, side (m)
+  charuco:7x5:0.04:0.03:DICT_5X5_100   squares, sides, markers' side, dictionary
   aprilgrid:6x6:0.088:0.0264           tags, their side, the gap between them
 
 Else INPUT is anything that 'stemvo run' takes. Examples:

@@ -14,8 +14,8 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kChannelFooter =
-    R"(For each frame --out receives NNNNNN_input.png, NNNNNN_filter_KKK.png and NNNNNN_sheet.png, which
-shows them side by side.
+    R"(For each frame --out receives NNNNNN_input.png, NNNNNN_filter_KKK.png and
+NNNNNN_sheet.png, which shows them side by side.
 
 Examples:
   stemvo channel kitti/sequences/03 --out images

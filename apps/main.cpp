@@ -38,39 +38,18 @@ edit it, then: stemvo run ... --config my.yaml
 Exit codes: 0 done, 1 something is wrong with a file, model or key (one line
 says what), 2 wrong usage, 130 interrupted (what was computed is written).)";
 
-constexpr std::size_t kWidth = 80;
-
-/// Broken at blanks. The rest goes on below the text: behind the name of an option, if there is
-/// one, and the two blanks that follow it.
-std::string wrap(std::string line) {
-  const std::size_t indent = std::min(line.find_first_not_of(' '), line.size());
-  const std::size_t gap = line.rfind("  ");
-  const bool is_entry = gap != std::string::npos && gap > indent && gap < kWidth / 2;
-  const std::string hang(is_entry ? gap + 2 : indent, ' ');
-  std::string text;
-  while (line.size() > kWidth && line.find("stemvo ") != indent) {
-    const std::size_t end = line.rfind(' ', kWidth);
-    if (end == std::string::npos || end <= hang.size()) {
-      break;
-    }
-    text += line.substr(0, line.find_last_not_of(' ', end) + 1) + '\n';
-    line.replace(0, end + 1, hang);
-  }
-  return text + line + '\n';
-}
-
-/// CLI11's help in lines of at most 80 characters; a command to copy stays whole.
+/// CLI11's help, with the options' texts in lines that end before column 80.
 class HelpFormat : public CLI::Formatter {
  public:
-  std::string make_help(const CLI::App* app,
-                        std::string name,
-                        CLI::AppFormatMode mode) const override {
-    std::istringstream lines(Formatter::make_help(app, std::move(name), mode));
-    std::string help;
-    for (std::string line; std::getline(lines, line);) {
-      help += wrap(line);
+  std::string make_option_desc(const CLI::Option* option) const override {
+    const std::size_t width = 80 - get_column_width();
+    std::string text = Formatter::make_option_desc(option);
+    for (std::size_t begin = 0; text.size() - begin > width;) {
+      const std::size_t blank = text.rfind(' ', begin + width);
+      text[blank] = '\n';
+      begin = blank + 1;
     }
-    return help;
+    return text;
   }
 };
 

@@ -14,10 +14,11 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kModelsFooter =
-    R"(A model is chosen by its name or by the path of its .onnx file (--set stem.model=MODEL), which says
-its kernel, stride and padding in its metadata: `stemvo-lab export` writes such files. Four need no
-file, to compare with: gray, input_layer (filters 0, 1, 2 = R, G, B), log (Laplacian of Gaussian) and
-census (gray levels against their surroundings').)";
+    R"(A model is chosen by its name or by the path of its .onnx file (--set
+stem.model=MODEL), which says its kernel, stride and padding in its metadata:
+`stemvo-lab export` writes such files. Four need no file, to compare with: gray,
+input_layer (filters 0, 1, 2 = R, G, B), log (Laplacian of Gaussian) and census
+(gray levels against their surroundings').)";
 
 std::string describe(const std::string& model, const ModelInfo& info, const Status& status) {
   const std::string alone =

@@ -24,13 +24,15 @@ constexpr const char* kRunFooter =
   EUROC, or its mav0    cam0/data.csv, cam0/sensor.yaml,
                         state_groundtruth_estimate0/data.csv
   TUM                   rgb.txt, groundtruth.txt; the camera by --camera
-  RECORDING             images/, camera.yaml, and where they exist times.txt and poses.txt
+  RECORDING             images/, camera.yaml, and where they exist times.txt
+                        and poses.txt
   drive.mp4             a video, decoded by FFmpeg; the camera by --camera
-  rtsp://HOST/PATH      a camera of the network, http:// and https:// too; --camera
-  camera:0              /dev/video0, live, until Ctrl-C or the end of --frames; --camera
+  rtsp://HOST/PATH      a camera of the network (http, https too); --camera
+  camera:0              /dev/video0, until Ctrl-C or the end of --frames; --camera
 
-With --camera any folder of PNG or JPEG images in the order of their names (frame2 before frame10),
-or a quoted pattern such as 'drive/left_*.png'. camera.yaml says whose they are:
+With --camera any folder of PNG or JPEG images in the order of their names
+(frame2 before frame10), or a quoted pattern such as 'drive/left_*.png'.
+camera.yaml says whose they are:
 
   image_width: 640
   image_height: 480
@@ -41,16 +43,17 @@ or a quoted pattern such as 'drive/left_*.png'. camera.yaml says whose they are:
   rate_hz: 30                                 # or give --times
   camera_height: 1.65                         # metres above the road, if known
 
-Also EuRoC's sensor.yaml, Kalibr's camchain.yaml, OpenCV's YAML and ROS' camera_info. Frames are
-undistorted, and over 1.5 megapixels made smaller. Without camera_height the path is up to scale
-(scale.source=none), but on KITTI folders, where it is 1.65; --set scale.camera_height_m=1.4 says it
-too.
+Also EuRoC's sensor.yaml, Kalibr's camchain.yaml, OpenCV's YAML and ROS'
+camera_info. Frames are undistorted, and over 1.5 megapixels made smaller.
+Without camera_height the path is up to scale (scale.source=none), but on KITTI
+folders, where it is 1.65; --set scale.camera_height_m=1.4 says it too.
 
 --out (a new results/NAME of INPUT without it) receives trajectory_kitti.txt and
-trajectory_tum.txt (the poses as they came), trajectory_map_kitti.txt and trajectory_map_tum.txt
-(as the map has them in the end, with its loops), map.ply (landmarks and path), report.html (all
-there is to look at, for a browser), trajectory.png (the path drawn), metrics.json (the numbers),
-frames.csv (a row per frame) and config.yaml (what was run).
+trajectory_tum.txt (the poses as they came), trajectory_map_kitti.txt and
+trajectory_map_tum.txt (as the map has them in the end, with its loops), map.ply
+(landmarks and path), report.html (all there is to look at, for a browser),
+trajectory.png (the path drawn), metrics.json (the numbers), frames.csv (a row
+per frame) and config.yaml (what was run).
 
 Examples:
   stemvo run kitti/sequences/03 --out result
