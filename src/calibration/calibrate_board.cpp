@@ -77,17 +77,6 @@ fs::path coverage_file(const BoardRequest& request) {
   return file;
 }
 
-/// Error: what is written would lie among the pictures.
-Status check_place(const fs::path& out, const fs::path& picture) {
-  const auto folder_of = [](const fs::path& file) { return fs::absolute(file).parent_path(); };
-  std::error_code code;
-  return fs::equivalent(folder_of(out), folder_of(picture), code)
-             ? Status(fail(fmt::format("{}: expected a file in another folder than the pictures', "
-                                       "for its coverage is no picture of the board",
-                                       out.string())))
-             : Status();
-}
-
 /// The size that most pictures have.
 Expected<cv::Size> look_at_images(const BoardRequest& request,
                                   const RunProgress& progress,
@@ -97,7 +86,7 @@ Expected<cv::Size> look_at_images(const BoardRequest& request,
                  dataset::list_images(dataset::is_folder(inside) ? inside : request.pictures));
   FrameSource frames;
   frames.files = listing.files;
-  STEMVO_TRY(check_place(request.out_file, frames.files.front()));
+  STEMVO_TRY(pipeline::check_is_no_input(request.out_file, frames.files));
   STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames));
   report.warnings = frames.warnings;
   add_line(report.warnings, listing.warning);
