@@ -52,8 +52,7 @@ inline constexpr std::array kResultNames = {"config.yaml",
                                             "trajectory_map_kitti.txt",
                                             "trajectory_map_tum.txt",
                                             "trajectory.png",
-                                            "map.ply",
-                                            ".stemvo_video"};  // names the video in the folder
+                                            "map.ply"};
 
 struct Run {
   const RunRequest& request;

@@ -48,31 +48,11 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   return sequence;
 }
 
-/// Removes the video that an earlier run wrote into the folder, unless this one writes it anew.
-Status remove_earlier_video(const RunRequest& request) {
-  const auto name =
-      read_text_file(request.out_dir / pipeline::kResultNames.back(), kMaxSettings_MB);
-  const auto video = std::filesystem::path(name.value_or("")).filename();
-  std::error_code code;
-  const bool is_anew =
-      request.video && std::filesystem::equivalent(*request.video, request.out_dir / video, code);
-  return video.empty() || is_anew ? Status() : remove_file(request.out_dir / video);
-}
-
-Status name_video(const RunRequest& request) {
-  std::error_code code;
-  const auto place = std::filesystem::absolute(request.video.value_or(""), code).parent_path();
-  return request.video && std::filesystem::equivalent(place, request.out_dir, code)
-             ? write_text_file(request.out_dir / pipeline::kResultNames.back(),
-                               request.video->filename().string())
-             : Status();
-}
-
 /// Removes an earlier run's results, so that every file under its final name belongs to this run
 /// whenever it is killed: config.yaml comes before frames and results.
 Status prepare_out_folder(const Run& run) {
   const std::filesystem::path& out = run.request.out_dir;
-  Status status = remove_earlier_video(run.request);
+  Status status;
   for (const char* name : pipeline::kResultNames) {
     status = status ? remove_file(out / name) : status;
   }
@@ -81,7 +61,6 @@ Status prepare_out_folder(const Run& run) {
   if (status && run.request.image_every > 0) {
     status = pipeline::create_out_folder(out / "pictures");
   }
-  status = status ? name_video(run.request) : status;
   return status ? write_text_file(out / "config.yaml", pipeline::config_text(run, 0)) : status;
 }
 

@@ -177,13 +177,6 @@ TEST_F(RecordingsRun, AVideoShowsFramesTracksAndPath) {
   }
   EXPECT_EQ(read_file(avi), before);
   EXPECT_EQ(poses(), earlier) << "a wrong name costs no result";
-  write_file(out_ + "/mine.mp4", "");
-  for (const std::string name : {"in.mkv", "in.mkv", "other.avi"}) {
-    succeeded(run(avi, {"--camera", camera_, "--frames", "0:2", "--video", out_ + "/" + name}));
-    EXPECT_GT(fs::file_size(out_ + "/" + name), 0U);
-  }
-  EXPECT_FALSE(fs::exists(out_ + "/in.mkv")) << "another result's";
-  EXPECT_TRUE(fs::exists(out_ + "/mine.mp4"));
 }
 
 TEST_F(RecordingsRun, WithoutOutResultsAreUnderTheirName) {
