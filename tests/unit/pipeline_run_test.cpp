@@ -294,16 +294,6 @@ TEST_F(PipelineRun, StoppingAfterTheLastFrameIsNoInterrupt) {
   EXPECT_FALSE(summary->interrupted);
 }
 
-TEST_F(PipelineRun, BrokenFrameIsAWarningWithItsFile) {
-  request_.config.scale_choice = ScaleChoice::kOptions;
-  fs::resize_file(request_.sequence_dir / "image_0/000003.png", 200);
-  const auto summary = run_sequence(request_);
-  EXPECT_THAT(summary->warnings, ElementsAre(HasSubstr("000003.png")));
-  EXPECT_EQ(summary->report.num_frames, 6U);
-  EXPECT_LT(summary->report.tracked_fraction, 1.0);
-  EXPECT_THAT(read_all(request_.out_dir / "frames.csv"), HasSubstr(",no_image,"));
-}
-
 TEST_F(PipelineRun, IsScoredFromWhereTheCameraStarts) {
   request_.config.scale_choice = ScaleChoice::kOptions;
   fs::resize_file(request_.sequence_dir / "image_0/000000.png", 200);
