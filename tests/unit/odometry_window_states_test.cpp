@@ -41,21 +41,6 @@ TEST(WindowEstimator, StationaryKeepsPoseMapAndScale) {
   expect_scale_kept(d, 59);
 }
 
-TEST(WindowEstimator, TurningOnTheSpotStaysThere) {
-  const std::vector<Rigid3> path =
-      path_with(Rigid3(so3_exp({0.0, 2.0 * kDeg, 0.0}), Eigen::Vector3d::Zero()), 10);
-  Driven d(DriveTracks(path, points_along(path, 3000, 5), 0.1, 5));
-  d.add_range(0, d.drive.num_frames());
-  d.expect_only(20, 30, FrameState::kRotating);
-  for (int i = 20; i < 30; ++i) {
-    EXPECT_LT(d.moved(19, i), 0.01) << i;
-  }
-  const Rigid3 turn = d.pose(19).inverse() * d.pose(29);
-  EXPECT_NEAR(turn.angle_rad(), 20.0 * kDeg, 0.1 * kDeg);
-  d.expect_only(31, 50, FrameState::kTracking);
-  expect_scale_kept(d, 29);
-}
-
 TEST(WindowEstimator, ATurnThatLosesEveryLandmarkFromViewStaysWhereItIs) {
   const std::vector<Rigid3> path =
       path_with(Rigid3(so3_exp({0.0, 2.5 * kDeg, 0.0}), Eigen::Vector3d::Zero()), 44);
