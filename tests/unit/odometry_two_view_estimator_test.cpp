@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "geometry/median.hpp"
 #include "odometry/two_view_estimator.hpp"
 #include "stemvo/two_view.hpp"
 #include "support/synthetic_scene.hpp"
@@ -72,6 +73,22 @@ TEST(TwoViewEstimator, ThePublicFunctionSaysWhatIsWrongWithItsInput) {
   EXPECT_FALSE(estimate_two_view(scene.prev_uv, scene.cur_uv, scene.camera, options));
   const auto none = estimate_two_view({}, {}, scene.camera).value();
   EXPECT_EQ(none.state, FrameState::kLost);
+}
+
+TEST(TwoViewEstimator, NoiseAndOutliersOver50Seeds) {
+  const Rigid3 prev_from_cur(so3_exp({0.002, 0.03, -0.001}), {0.05, 0.01, 1.0});
+  std::vector<double> rotation_errors_rad;
+  std::vector<double> direction_errors_rad;
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    const MeasuredMotion motion = measure(drive_scene(prev_from_cur, 0.3, 0.3, seed));
+    ASSERT_EQ(motion.state, FrameState::kTracking) << "seed " << seed;
+    const Rigid3 estimate = motion.cur_from_prev.inverse();
+    rotation_errors_rad.push_back(estimate.rotation.angularDistance(prev_from_cur.rotation));
+    direction_errors_rad.push_back(
+        (estimate.translation - prev_from_cur.translation.normalized()).norm());
+  }
+  EXPECT_LE(median(rotation_errors_rad), 5e-4);
+  EXPECT_LE(median(direction_errors_rad), 1e-2);
 }
 
 TEST(TwoViewEstimator, InitialModelFollowsTheScene) {
