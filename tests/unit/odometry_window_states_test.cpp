@@ -209,26 +209,6 @@ TEST(WindowRecovery, TracksThatEndAnywhereAreLostAndTheOldMapServesAgain) {
   d.expect_true_step(kBadFrame - 1, kBadFrame);
 }
 
-TEST(WindowRecovery, AfterALossANewMapIsMadeInAUnitOfItsOwn) {
-  WellDriven d;
-  EXPECT_EQ(d.run.add_matches({}, kBadFrame).state, FrameState::kLost);
-  bool was_initializing = false;
-  for (int i = kBadFrame + 1; i < 20; ++i) {
-    const FrameResult result = d.run.add_matches(d.drive.other_matches(i), i);
-    EXPECT_TRUE(result.state == FrameState::kInitializing || result.state == FrameState::kTracking)
-        << i << ": " << to_string(result.state);
-    was_initializing = was_initializing || result.state == FrameState::kInitializing;
-    EXPECT_GT(result.num_inliers, 100) << i;
-  }
-  EXPECT_TRUE(was_initializing);
-  EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
-  EXPECT_GE(d.estimator.window().keyframes.front().frame, kBadFrame);
-  // As long as the steps before: the last one measured is the new unit.
-  EXPECT_NEAR(
-      length_ratio(d.estimator.trajectory(), d.drive.world_from_camera, 18, 19) * d.unit_m(), 1.0,
-      0.1);
-}
-
 TEST(WindowRecovery, StandingStillAfterALossDoesNotLengthenTheUnit) {
   WellDriven d;
   EXPECT_EQ(d.run.add_matches({}, kBadFrame).state, FrameState::kLost);
