@@ -43,6 +43,13 @@ Chain make_chain(const OdometryOptions& options = {}, double step_m = 1.0) {
   return {options, scale};
 }
 
+TEST(MotionChain, ForwardDriveGoesForwardByConstantSteps) {
+  Chain chain = make_chain({}, 0.7);
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kInitializing);
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kTracking);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.4, 1e-12);
+}
+
 TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
   OdometryOptions paper{.composition = Composition::kPaper};
   Chain right = make_chain();
