@@ -196,10 +196,6 @@ TEST(KittiTrajectory, ABrokenLineIsNamedWithFileAndLine) {
         {"1 1 0 0 0 0 1 0 0 0 0 1 0", "expected 12 numbers, found 13"},
         {"", "expected 12 numbers, found 0"},
         {"1 0 0 zero 0 1 0 0 0 0 1 0", "expected a finite number, found 'zero'"},
-        {"1 0 0 1,5 0 1 0 0 0 0 1 0", "found '1,5'"},
-        {"1 0 0 nan 0 1 0 0 0 0 1 0", "expected a finite number, found 'nan'"},
-        {"1 0 0 0 0 1 0 -inf 0 0 1 0", "expected a finite number, found '-inf'"},
-        {"1 0 0 1e999 0 1 0 0 0 0 1 0", "found '1e999'"},
         {"2 0 0 0 0 1 0 0 0 0 1 0", "R^T R off the identity by 3"},
         {"0 0 0 0 0 0 0 0 0 0 0 0", "expected a rotation"},
         {"1 0 0 0 0 1 0 0 0 0 -1 0", "found a reflection"}}) {
@@ -232,9 +228,6 @@ TEST(PoseFile, ErrorsNameFileAndLine) {
 TEST(PoseFile, NumbersBetweenCommasAndNamesInComments) {
   const TempFolder folder;
   const auto read = [&](const std::string& text) { return read_pose_file(folder.file("p", text)); };
-  const auto kitti = read("1,0,0,5,0,1,0,6,0,0,1,7\n");
-  EXPECT_THAT(kitti->timestamps_s, IsEmpty());
-  EXPECT_EQ(kitti->poses[0].translation, Eigen::Vector3d(5, 6, 7));
   EXPECT_THAT(read("1700000000500000000,5,6,7,0,0,0,1\n").error().message,
               AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's")));
   EXPECT_THAT(message_of(read("#t [s], q_RS_w, q_RS_x\n1.25,5,6,7,1,0,0,0\n")),
