@@ -48,6 +48,18 @@ TEST(Localization, FindsThePoseWhateverIsPredictedThoughMostLandmarksAreWrong) {
   wrong.expect_found(wrong.from(Rigid3()), 0.05);
 }
 
+TEST(Localization, TheNearerOfTwoPredictionsIsKnownByTheLandmarks) {
+  const Seen seen(300, 0.2, 0.2);
+  const Rigid3 near = seen.world_from_camera * Rigid3(so3_exp({0.0, 0.05, 0.0}), {0.0, 0.1, 0.3});
+  const Rigid3 far = seen.world_from_camera * Rigid3(so3_exp({0.0, -0.5, 0.1}), {0.0, 0.1, 0.3});
+  const auto nearer = [&](const Rigid3& a, const Rigid3& b) {
+    return nearer_pose(a, b, seen.landmarks, seen.camera).matrix();
+  };
+  EXPECT_EQ(nearer(near, far), near.matrix());
+  EXPECT_EQ(nearer(far, near), near.matrix());
+  EXPECT_EQ(nearer_pose(far, near, {}, seen.camera).matrix(), far.matrix());
+}
+
 TEST(Localization, TooFewOrContradictingLandmarksGiveNoPose) {
   const Seen few(LocalizationOptions{}.min_landmarks - 1, 0.0, 0.0);
   EXPECT_FALSE(few.from(few.world_from_camera).has_value());
