@@ -53,25 +53,8 @@ TEST_F(BadInput, Configuration) {
   expect_error(run({"--config", folder_.path().string()}), 1, {"found a folder"});
   expect_error(run({"--set", "stem.filter=3", "--set", "seed=2", "--set", "stem.filter=4"}), 1,
                {"--set stem.filter: expected once", "'stem.filter=3'", "'stem.filter=4'"});
-  expect_error(run({"--save-map", folder_ / "place.map", "--set", "odometry.mode=two_frame",
-                    "--set", "scale.source=constant_speed"}),
-               1, {"--save-map", "odometry.mode map", "found mode two_frame"});
   expect_error(run({"--map", folder_ / "poses/00.txt"}), 1,
                {"00.txt: expected a map of stemvo, found another kind of file"});
-}
-
-TEST_F(BadInput, Channel) {
-  const auto channel = [&](const Words& more) {
-    return run_stemvo({"channel", sequence_.string(), "--out", out_}, more);
-  };
-  expect_error(channel({"--filters", "0:500"}), 1, {"default", "--filters 0:500"});
-  expect_error(channel({"--frames", "3:99"}), 1, {"0:10"});
-  succeeded(channel({"--frames", "2:4", "--filters", "1:3"}));
-  for (const char* name :
-       {"000002_input", "000003_filter_001", "000003_filter_002", "000002_sheet"}) {
-    EXPECT_TRUE(fs::exists(out_ + "/" + name + ".png")) << name;
-  }
-  EXPECT_FALSE(fs::exists(out_ + "/000003_filter_003.png"));
 }
 
 }  // namespace

@@ -52,25 +52,6 @@ TEST_F(Overwrite, NoCommandTakesAFolderThatIsNotItsOwn) {
   EXPECT_EQ(std::distance(fs::directory_iterator(mine), fs::directory_iterator()), 1);
 }
 
-TEST_F(Overwrite, ResultsOfAnotherCommandStay) {
-  succeeded(
-      run_stemvo({"channel", sequence_, "--frames", "0:1", "--filters", "0:1", "--out", out_}));
-  write_file(fs::path(out_) / "config.yaml", "mine");
-  expect_error(run_stemvo({"run", sequence_, "--quiet", "--out", out_}), 1,
-               {out_, "results of 'stemvo run', found other files"});
-  EXPECT_EQ(read_file(fs::path(out_) / "config.yaml"), "mine");
-}
-
-TEST_F(Overwrite, AnInputBehindALinkStays) {
-  succeeded(run_stemvo({"run", sequence_, "--quiet", "--out", out_}));
-  const fs::path truth = fs::path(out_) / "trajectory_kitti.txt";
-  fs::copy_file(folder_ / "poses/00.txt", truth, fs::copy_options::overwrite_existing);
-  fs::create_symlink(truth, folder_ / "gt.txt");
-  expect_error(run_stemvo({"run", sequence_, "--gt", folder_ / "gt.txt", "--quiet", "--out", out_}),
-               1, {out_, "expected a folder that holds no input"});
-  EXPECT_EQ(read_file(truth), read_file(folder_ / "poses/00.txt"));
-}
-
 TEST_F(Overwrite, PosesThatADriveIsRenderedAlongStay) {
   const std::string drive = folder_ / "drive";
   const Words synth = {"synth", drive, "--frames", "2"};
@@ -89,12 +70,6 @@ TEST_F(Overwrite, NothingIsLeftInTheUsersHome) {
                         {"HOME=" + home.string(), "XDG_CACHE_HOME=" + (home / "cache").string(),
                          STEMVO_PROGRAM, "run", sequence_, "--quiet", "--out", out_}));
   EXPECT_TRUE(fs::is_empty(home)) << "ONNX Runtime's telemetry keeps a file there";
-}
-
-TEST_F(Overwrite, ARunIsRepeatedWithItsOwnConfiguration) {
-  succeeded(run_stemvo({"run", sequence_, "--quiet", "--out", out_}));
-  succeeded(
-      run_stemvo({"run", sequence_, "--quiet", "--out", out_, "--config", out_ + "/config.yaml"}));
 }
 
 }  // namespace

@@ -105,38 +105,6 @@ TEST_F(RecordingsRun, AVideoThatIsCutOff) {
   expect_error(cut_to(0.0), 1, {"drive.avi"});
 }
 
-TEST_F(RecordingsRun, LargeFramesAreWorkedOnSmaller) {
-  fs::create_directories(folder_.path() / "large");
-  for (int i = 0; i < 3; ++i) {
-    cv::Mat large;
-    cv::resize(cv::imread(image(i).string()), large, {2480, 752}, 0, 0, cv::INTER_CUBIC);
-    cv::imwrite(folder_ / fmt::format("large/{}.png", i), large);
-  }
-  write_file(camera_,
-             "resolution: [2480, 752]\nintrinsics: [1400, 1400, 1240, 376]\n"
-             "distortion_model: none\nrate_hz: 10\n");
-  const ProgramResult result = succeeded(run(folder_ / "large", {"--camera", camera_}));
-  EXPECT_THAT(result.err, HasSubstr("3 frames of 2480x752 pixels worked on at 1653x501"));
-}
-
-TEST_F(RecordingsRun, AMaskKeepsPointsAway) {
-  const std::string before = expected_poses();
-  succeeded(run(sequence_.string(), {"--mask", "0,150,620,38", "--set", "scale.source=none"}));
-  EXPECT_NE(poses(), before);
-  cv::imwrite(folder_ / "mask.png", [] {
-    cv::Mat mask(188, 620, CV_8UC1, cv::Scalar(255));
-    mask(cv::Rect(0, 150, 620, 38)) = 0;
-    return mask;
-  }());
-  const std::string by_rectangle = poses();
-  succeeded(
-      run(sequence_.string(), {"--mask", folder_ / "mask.png", "--set", "scale.source=none"}));
-  EXPECT_EQ(poses(), by_rectangle);
-  expect_error(run(sequence_.string(), {"--mask", "0,0,620,188"}), 1, {"--mask"});
-  expect_error(run(sequence_.string(), {"--mask", "0,0,10,10", "--mask", "nowhere.png"}), 1,
-               {"--mask", "nowhere.png"});
-}
-
 TEST_F(RecordingsRun, AVideoShowsFramesTracksAndPath) {
   const std::string avi = write_video();
   const std::string before = read_file(avi);

@@ -34,10 +34,8 @@ def test_only_results_of_the_same_command_are_replaced(tmp_path):
         runs.open_folder(out, "search", [])
     with pytest.raises(ValueError, match="found other files"):
         runs.open_folder(tmp_path, "compare", [])
-    (out / "truth.txt").symlink_to(given)
-    for folder, inside in ((tmp_path, given), (tmp_path, out / "truth.txt"), (out, out / "truth.txt")):
-        with pytest.raises(ValueError, match="expected a folder that holds no input, found .*truth.txt"):
-            runs.open_folder(folder, "compare", [inside])
+    with pytest.raises(ValueError, match="expected a folder that holds no input, found .*truth.txt"):
+        runs.open_folder(tmp_path, "compare", [given])
     with pytest.raises(ValueError, match="can be written"):
         runs.open_folder(given / "out", "compare", [])
     message = CliRunner().invoke(main, ["compare", str(given), "--gt", str(given), "--out", str(tmp_path)]).output

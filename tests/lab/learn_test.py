@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 from exporting import run_onnx
 from stemvo.lab.cli import main
-from stemvo.stems import discriminant, drive, learn, metadata
+from stemvo.stems import drive, learn, metadata
 
 SIZE = (96, 128)
 FOCAL_PX = 100.0
@@ -132,18 +132,3 @@ def test_errors_are_one_line(wall, file, content, words):
     (wall / "drive" / file).write_bytes(content)
     said = learned(wall, "out", code=1)
     assert said.count("\n") == 1 and words in said, said
-
-
-def test_planted_slopes_for_tracking():
-    """Two even filters with a slope in one direction each, energies 4 and 9: their mixture has 4 * 9 / (4 + 9) in both.
-    An odd filter with 2 and 1 is not mixed in. (A little of both couples the two: a double eigenvalue is no road's.)"""
-    even = np.zeros((2, 16))
-    even[0, [0, 3]] = even[1, [5, 6]] = 0.5**0.5
-    odd = np.zeros(16)
-    odd[[8, 11]] = 0.5**0.5, -(0.5**0.5)
-    slopes = [along * np.outer(filter_, filter_) + own * np.outer(odd, odd) + 1e-3 * np.outer(even.sum(axis=0), even.sum(axis=0))
-              for along, filter_, own in ((4, even[0], 2), (9, even[1], 1))]
-    filters, ratios = discriminant.tracking_filters(slopes, np.eye(16), 4)
-    np.testing.assert_allclose(ratios[[0, 2]], [36 / 13, 1], atol=0.01)
-    np.testing.assert_allclose(np.abs(filters[0] @ even.T), [(9 / 13)**0.5, (4 / 13)**0.5], atol=0.01)
-    np.testing.assert_allclose(np.abs(filters[2]), np.abs(odd), atol=1e-9)

@@ -157,29 +157,5 @@ TEST_F(Disturbed, WhoDrivesGoesOnWhateverPassesBy) {
               0.05 * 20 * kStep_m);
 }
 
-TEST_F(Disturbed, WithoutARoadTheScaleIsHeldAndItsDoubtGrows) {
-  const StateDrive drive = standing_drive();
-  copy("standing", drive);
-  change(20, 35, [](int, cv::Mat& image) {  // something covers the lower part of the image
-    image.rowRange(image.rows * 52 / 100, image.rows).setTo(cv::Scalar(90, 90, 90));
-  });
-  const StateRun result = run();
-  for (std::size_t i = 15; i < 45; ++i) {
-    // Frame 35 still has only covered images behind it.
-    const bool is_covered = i >= 20 && i < 35;
-    if (i != 35) {
-      EXPECT_EQ(result.roads[i], is_covered ? "held" : "measured") << i;
-    }
-    if (is_covered && i > 20) {
-      EXPECT_GT(std::stod(result.sigmas[i]), std::stod(result.sigmas[i - 1])) << i;
-    }
-    if (i < 40) {
-      EXPECT_NEAR((result.poses[i].translation - result.poses[i - 1].translation).norm(), kStep_m,
-                  0.06 * kStep_m)
-          << i;
-    }
-  }
-}
-
 }  // namespace
 }  // namespace stemvo

@@ -100,38 +100,5 @@ TEST_F(Times, DroppedFramesAndJitterCostLittleAndFramesTakenForEvenlySpacedMore)
   EXPECT_GT(with_times.inliers, 1.01 * without.inliers);
 }
 
-/// An image tells where its points are; where it tells nothing, time alone says how far the camera
-/// went.
-TEST_F(Times, ADarkFrameLiesAsFarAheadAsItsTimeSays) {
-  const Trajectory& truth = clip_->ground_truth->poses;
-  constexpr std::size_t kSeen = 30;
-  constexpr std::size_t kDark = 34;  // those between are dropped
-  const auto error = [&](double dark_s) {
-    Odometry odometry = Odometry::create(clip_->camera).value();
-    Trajectory estimate;
-    for (std::size_t i = 0; i <= kSeen; ++i) {
-      const cv::Mat image = clip_->read(i).value();
-      const FrameResult frame = odometry.process(image, order_of(image), clip_->time_s(i)).value();
-      estimate.push_back(frame.world_from_camera);
-    }
-    const cv::Mat dark = 0 * clip_->read(kDark).value();
-    const FrameResult last = odometry.process(dark, order_of(dark), dark_s).value();
-    EXPECT_FALSE(is_measured(last.state));
-    const auto way = [](const Rigid3& from, const Rigid3& to) {
-      return (from.inverse() * to).translation;
-    };
-    const double metres =
-        way(truth[0], truth[kSeen]).norm() / way(estimate[0], estimate[kSeen]).norm();
-    const Eigen::Vector3d true_way = way(truth[kSeen], truth[kDark]);
-    return (metres * way(estimate[kSeen], last.world_from_camera) - true_way).norm() /
-           true_way.norm();
-  };
-  const double with_times = error(clip_->time_s(kDark));
-  const double without = error(clip_->time_s(kSeen) + interval_s());
-  std::cout << "off by " << with_times << " of the way, without times by " << without << "\n";
-  EXPECT_LT(with_times, 0.1);
-  EXPECT_GT(without, 0.5);
-}
-
 }  // namespace
 }  // namespace stemvo

@@ -126,9 +126,6 @@ class TestBag:
         self.expect_error(["camera of whole images"], self.write("bag", binning_x=2), self.out)
         self.expect_error(["without skew"], self.write("sqlite3", k=np.array([150.0, 3, 79.5, 0, 151.0, 59.5, 0, 0, 1])), self.out)
 
-    def test_a_bag_that_is_not_there(self):
-        self.expect_error(["none.bag: expected a bag, found nothing"], self.folder / "none.bag", self.out)
-
     def test_what_cannot_be_converted_is_one_line(self):
         bag = self.write("bag", "yuv422")
         self.expect_error(["yuv422", "rgb8"], bag, self.out)

@@ -82,16 +82,13 @@ next(unfinished)
 del unfinished
 gc.collect()
 
-masked = stemvo.Odometry(recording)
 half = np.zeros(frames[0][0].shape[:2], np.uint8)
 half[:, :310] = 255
 turn = np.eye(3)
+masked = stemvo.Odometry(recording)
 for image, time in frames:
     result = masked.process(image, time, mask=half, rotation_hint=turn)
     assert np.all(masked.tracked_points()[0][:, 2] < 310)
-raises(lambda: masked.process(*frames[0], rotation_hint=2 * turn), "rotation_hint: expected a rotation")
-raises(lambda: masked.process(image, time + 1.0, mask=half[1:]), "mask: expected")
-raises(lambda: masked.process(*frames[0], mask=half.astype(float)), "mask: expected an array HxW")
 masked = stemvo.Odometry(recording, mask=half)
 for result in masked.run(frames):
     assert np.all(masked.tracked_points()[0][:, 2] < 310)

@@ -103,6 +103,7 @@ TEST_F(Run, ItsConfigRunsAgain) {
   EXPECT_TRUE(read_file(out_ + "1/trajectory_kitti.txt") ==
               read_file(out_ + "2/trajectory_kitti.txt"));
   EXPECT_TRUE(read_file(out_ + "1/config.yaml") == read_file(out_ + "2/config.yaml"));
+  succeeded(run_drive(sequence_, out_ + "2", {"--config", out_ + "2/config.yaml"}));
 }
 
 TEST_F(Run, AnyChannelAndFrontEndRuns) {

@@ -39,8 +39,4 @@ MATCHER_P2(IsNearMotion, expected, tolerance, "is near the expected motion") {
   return angle <= tolerance && distance <= tolerance;
 }
 
-MATCHER(IsFiniteMotion, "has no NaN") {
-  return arg.rotation.coeffs().allFinite() && arg.translation.allFinite();
-}
-
 }  // namespace stemvo::testing

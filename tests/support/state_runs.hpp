@@ -34,7 +34,6 @@ inline Words column(const std::string& csv, const std::string& name) {
 struct StateRun {
   Words states;
   Words roads;
-  Words sigmas;
   Trajectory poses;
 
   void expect_states(int from, int to, const Words& allowed) const {
@@ -53,7 +52,7 @@ inline StateRun run_states(const std::filesystem::path& sequence, const std::str
   succeeded(run_stemvo({"run", sequence.string(), "--out", out, "--quiet", "--set",
                         "odometry.mode=map", "--set", "scale.source=" + scale}));
   const std::string csv = read_file(out + "/frames.csv");
-  return {column(csv, "state"), column(csv, "scale_state"), column(csv, "scale_sigma"),
+  return {column(csv, "state"), column(csv, "scale_state"),
           read_kitti_trajectory(out + "/trajectory_kitti.txt").value()};  // refuses NaN
 }
 

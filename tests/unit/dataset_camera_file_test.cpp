@@ -52,16 +52,6 @@ TEST_F(CameraFileTest, ReadsEveryKey) {
   EXPECT_EQ(file->camera_height_m, 1.2);
 }
 
-TEST_F(CameraFileTest, OtherNamesOfTheModels) {
-  std::string four = with_line(5, "distortion_model: radtan");
-  EXPECT_EQ(error_of(four), "no error");
-  four = with_line(6, "distortion_coefficients: [0.1, 0, 0, 0]");
-  EXPECT_EQ(error_of(four), "no error") << "k3 may be absent";
-  four.replace(four.find("radial-tangential"), 17, "equidistant");
-  const auto file = read_camera_file(folder_.file("camera.yaml", four));
-  EXPECT_EQ(file->camera.distortion, Distortion::kEquidistant);
-}
-
 TEST_F(CameraFileTest, NoYaml) {
   expect_refused("intrinsics: [1, 2\n", {"camera.yaml:2", "not YAML"});
   expect_refused("\x89PNG\r\n\x1a\n", {"camera.yaml:1"});
@@ -184,21 +174,6 @@ TEST_F(CameraFileTest, OddRowsOfAMatrix) {
   expect_refused("cam0: {T_cam_imu: [&row [1, 0, 0, 0], *row, *row]}\n", {"camera.yaml"});
 }
 
-/// The camera of kOpenCv, kRos and message().
-void expect_their_camera(const Camera& camera) {
-  EXPECT_THAT(numbers_of(camera), ElementsAre(520.0, 521.0, 325.5, 249.5, 640, 480));
-  EXPECT_EQ(camera.distortion, Distortion::kRadialTangential);
-  EXPECT_EQ(camera.distortion_coefficients, (std::array<double, 12>{0.2, -0.7, 0.0, 0.001, 0.9}));
-}
-
-TEST_F(CameraFileTest, FileStorageOfOpenCvAndCameraInfoOfRos) {
-  for (const char* text : {kOpenCv, kRos}) {
-    const auto file = read_camera_file(folder_.file("camera.yaml", text));
-    expect_their_camera(file->camera);
-    EXPECT_FALSE(file->rate_hz);
-  }
-}
-
 /// As ROS 2 prints it; `rest` follows `distortion_model: `.
 std::string message(const std::string& rest) {
   return "header:\n  stamp:\n    sec: 1\n    nanosec: 2\n  frame_id: head\nheight: 480\nwidth: "
@@ -211,13 +186,6 @@ std::string message(const std::string& rest) {
 
 TEST_F(CameraFileTest, AMessageOfRos) {
   const std::string five = "plumb_bob\nd:\n- 0.2\n- -0.7\n- 0.0\n- 0.001\n- 0.9\n";
-  std::string first = message(five);  // as ROS 1 prints it
-  first.replace(first.find("\nk:\n"), 4, "\nK:\n");
-  first.replace(first.find("\nd:\n"), 4, "\nD:\n");
-  for (const std::string& text : {message(five), first}) {
-    const auto file = read_camera_file(folder_.file("camera.yaml", text));
-    expect_their_camera(file->camera);
-  }
   const auto none = read_camera_file(folder_.file("camera.yaml", message("plumb_bob\nd: []\n")));
   EXPECT_EQ(none->camera.distortion, Distortion::kNone);
   expect_refused(message("rational_polynomial\nd: [1]\n"), {"d: expected [k1, k2, p1, p2]"});

@@ -102,8 +102,6 @@ TEST_F(KittiSequenceTest, CalibrationProblems) {
   const fs::path file = folder_ / "calib.txt";
   write(file, "P0: 90 0 3 0 0 90 2 0 0 0 1 0\n");
   EXPECT_THAT(open_error(), HasSubstr("expected a row 'P2:'"));
-  write(file, "\nP2: 100 0 nan 5 0 101 3 0 0 0 1 0\n");
-  EXPECT_THAT(open_error(), HasSubstr("calib.txt:2: expected a finite number, found 'nan'"));
   write(file, "P2: 100 0 4 5 0 101 3 0 0 0 1\n");
   EXPECT_THAT(open_error(), HasSubstr("calib.txt:1: expected 12 numbers, found 11"));
   write(file, "P2: 0 0 4 5 0 101 3 0 0 0 1 0\n");
@@ -112,8 +110,6 @@ TEST_F(KittiSequenceTest, CalibrationProblems) {
   EXPECT_THAT(open_error(), HasSubstr("pinhole"));
   write(file, "corner_dist: 1.0\r\nP_rect_02: 100 0 4 5 0 101 3 0 0 0 1 0\r\n");
   EXPECT_EQ(open_error(), "no error") << "the raw data's name, lines ended by CR LF";
-  fs::remove(file);
-  EXPECT_THAT(open_error(), HasSubstr("calib.txt: cannot read: No such file"));
 }
 
 TEST_F(KittiSequenceTest, ImagesOfAnotherSizeThanTheRawCalibrationSaysAreRefused) {

@@ -95,22 +95,6 @@ class Recordings : public ::testing::Test {
   TempFolder temp_;
 };
 
-TEST_F(Recordings, EurocByItsFolderItsMav0OrOneCamera) {
-  const fs::path folder = write_euroc();
-  for (const fs::path& input : {folder, folder / "mav0", folder / "mav0/cam0", folder / "mav0/"}) {
-    const auto source = open_source(request(input));
-    EXPECT_EQ(source->kind, "EuRoC recording");
-    EXPECT_EQ(source->name, "MH_00");
-    ASSERT_EQ(source->size(), 6U);
-    EXPECT_NEAR(source->time_s(5) - source->time_s(0), 0.25, 1e-6);
-    EXPECT_EQ(source->camera.fy_px, 61.0);
-    EXPECT_EQ(source->given_calibration->filename(), "sensor.yaml");
-    for (int i = 0; i < kNumFrames; ++i) {
-      expect_frame(source->read(static_cast<std::size_t>(i)), i);
-    }
-  }
-}
-
 TEST_F(Recordings, EurocTruthIsTheCamerasAndOfFramesThatHaveSome) {
   const auto source = open_source(request(write_euroc()));
   const auto truth = source->ground_truth_of(6).value();
@@ -281,28 +265,6 @@ TEST_F(Recordings, GrayLevelsThatAVideoLosesAreSaid) {
   };
   EXPECT_THAT(warnings_of(CV_8UC1), IsEmpty());
   EXPECT_THAT(warnings_of(CV_16UC1), ElementsAre(HasSubstr("of 16 bits per gray level")));
-}
-
-TEST_F(Recordings, AVideoHasTruthByTimeOrByFrame) {
-  FrameSourceRequest video = request(write_video());
-  video.camera_file = camera("");
-  const auto frames_of = [&] {
-    const auto source = open_source(video);
-    for (std::size_t i = 0; i < 3; ++i) {
-      expect_frame(source->read(i), static_cast<int>(i));
-    }
-    return source->ground_truth_of(3).value()->frames;
-  };
-  std::string poses;
-  std::string timed;
-  for (int i = 0; i < kNumFrames; ++i) {
-    poses += fmt::format("1 0 0 0 0 1 0 0 0 0 1 {}\n", i);
-    timed += i == 1 ? "" : fmt::format("{} 0 0 {} 0 0 0 1\n", 0.04 * i + 0.003, i);
-  }
-  video.ground_truth = temp_.file("kitti.txt", poses);
-  EXPECT_THAT(frames_of(), ElementsAre(0, 1, 2));
-  video.ground_truth = temp_.file("tum.txt", timed);
-  EXPECT_THAT(frames_of(), ElementsAre(0, 2));
 }
 
 TEST_F(Recordings, WhatIsNoVideoOrOfAnotherSizeIsRefused) {

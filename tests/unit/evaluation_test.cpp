@@ -17,32 +17,13 @@ Trajectory straight(int num_poses, double step_m) {
 }
 
 /// Steps of one metre, each turned by `yaw_rad` more.
-Trajectory circle(int num_poses, double yaw_rad, double step_m = 1.0) {
+Trajectory circle(int num_poses, double yaw_rad) {
   Trajectory poses(1);
-  const Rigid3 step(so3_exp({0, yaw_rad, 0}), {0, 0, step_m});
+  const Rigid3 step(so3_exp({0, yaw_rad, 0}), {0, 0, 1.0});
   for (int i = 1; i < num_poses; ++i) {
     poses.push_back(poses.back() * step);
   }
   return poses;
-}
-
-Trajectory moved(const Trajectory& poses, const Rigid3& by) {
-  Trajectory result;
-  for (const Rigid3& pose : poses) {
-    result.push_back(by * pose);
-  }
-  return result;
-}
-
-TEST(Evaluate, TruthAgainstItselfIsZero) {
-  const Trajectory truth = circle(500, 0.01);
-  const Metrics metrics = evaluate(truth, truth);
-  EXPECT_LE(metrics.t_rel_percent.value(), 1e-9);
-  EXPECT_LE(metrics.r_rel_deg_per_100m.value(), 1e-9);
-  EXPECT_LE(metrics.average_offset_m, 1e-12);
-  EXPECT_LE(metrics.ate_rmse.none_m, 1e-12);
-  EXPECT_LE(metrics.ate_rmse.sim3_m, 1e-9);
-  EXPECT_LE(metrics.rpe_rotation_deg, 1e-9);
 }
 
 // A segment of nominally L metres ends at the first frame beyond L: L + 1 m with steps of 1 m. 1 %
@@ -126,18 +107,6 @@ TEST(Evaluate, OffsetTakesXAndZAndLeavesHeightOut) {
   EXPECT_NEAR(evaluate(estimate, truth).average_offset_m, (3.0 + 5.0) / 2.0, 1e-12);
 }
 
-TEST(Evaluate, WhereTheFilesBeginDoesNotMatter) {
-  const Trajectory truth = circle(300, 0.01, 1.003);  // no segment ends exactly on a frame
-  const Trajectory estimate = circle(300, 0.0101, 1.02);
-  const Metrics a = evaluate(estimate, truth);
-  const Metrics b = evaluate(moved(estimate, Rigid3(so3_exp({0.3, 1.0, -0.2}), {5, 6, 7})),
-                             moved(truth, Rigid3(so3_exp({-1.0, 0.1, 0.4}), {-70, 8, 9})));
-  EXPECT_NEAR(a.t_rel_percent.value(), b.t_rel_percent.value(), 1e-9);
-  EXPECT_NEAR(a.average_offset_m, b.average_offset_m, 1e-9);
-  EXPECT_NEAR(a.ate_rmse.none_m, b.ate_rmse.none_m, 1e-9);
-  EXPECT_NEAR(a.ate_rmse.sim3_m, b.ate_rmse.sim3_m, 1e-9);
-}
-
 TEST(AlignTrajectory, UndoesAPlantedSimilarity) {
   const Trajectory truth = circle(200, 0.02);
   Trajectory estimate;
@@ -178,31 +147,6 @@ TEST(EvaluateOnSharedData, StereoOrbSlam2OnSequence00ScoresAsPublished) {
 
 constexpr char kIdentityRow[] = "1 0 0 0 0 1 0 0 0 0 1 0\n";
 
-/// A bent path whose poses have nothing round in them.
-Trajectory bent_path(int num_poses) {
-  Trajectory poses;
-  for (int i = 0; i < num_poses; ++i) {
-    poses.emplace_back(so3_exp({0.01 * i, -0.03 * i, 0.002 * i}),
-                       Eigen::Vector3d(0.1 * i * i, -0.05 * i, 1234.5 + 1.1 * i));
-  }
-  return poses;
-}
-
-void expect_near(const Trajectory& found, const Trajectory& expected, double tolerance) {
-  ASSERT_EQ(found.size(), expected.size());
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    EXPECT_LE((found[i].matrix() - expected[i].matrix()).cwiseAbs().maxCoeff(), tolerance) << i;
-  }
-}
-
-TEST(KittiTrajectory, ComesBackAsItWasWritten) {
-  const TempFolder folder;
-  const Trajectory poses = bent_path(50);
-  ASSERT_TRUE(write_kitti_trajectory(folder / "poses.txt", poses));
-  const Expected<Trajectory> found = read_kitti_trajectory(folder / "poses.txt");
-  expect_near(*found, poses, 1e-8);
-}
-
 TEST(KittiTrajectory, HasTwelveNumbersSingleSpacesAndNineDigits) {
   const TempFolder folder;
   ASSERT_TRUE(write_kitti_trajectory(
@@ -232,10 +176,6 @@ TEST(KittiTrajectory, ABrokenLineIsNamedWithFileAndLine) {
         {"1 1 0 0 0 0 1 0 0 0 0 1 0", "expected 12 numbers, found 13"},
         {"", "expected 12 numbers, found 0"},
         {"1 0 0 zero 0 1 0 0 0 0 1 0", "expected a finite number, found 'zero'"},
-        {"1 0 0 1,5 0 1 0 0 0 0 1 0", "found '1,5'"},
-        {"1 0 0 nan 0 1 0 0 0 0 1 0", "expected a finite number, found 'nan'"},
-        {"1 0 0 0 0 1 0 -inf 0 0 1 0", "expected a finite number, found '-inf'"},
-        {"1 0 0 1e999 0 1 0 0 0 0 1 0", "found '1e999'"},
         {"2 0 0 0 0 1 0 0 0 0 1 0", "R^T R off the identity by 3"},
         {"0 0 0 0 0 0 0 0 0 0 0 0", "expected a rotation"},
         {"1 0 0 0 0 1 0 0 0 0 -1 0", "found a reflection"}}) {
@@ -244,37 +184,6 @@ TEST(KittiTrajectory, ABrokenLineIsNamedWithFileAndLine) {
     const std::string message = message_of(read_kitti_trajectory(file));
     EXPECT_THAT(message, AllOf(HasSubstr(file.string() + ":2: "), HasSubstr(complaint)));
     EXPECT_EQ(message.find('\n'), std::string::npos);
-  }
-}
-
-TEST(TumTrajectory, ComesBackAsItWasWritten) {
-  const TempFolder folder;
-  const Trajectory poses = bent_path(20);
-  std::vector<double> times_s;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    times_s.push_back(0.1036224 * static_cast<double>(i));
-  }
-  ASSERT_TRUE(write_tum_trajectory(folder / "tum.txt", times_s, poses));
-  const Expected<PoseFile> found = read_pose_file(folder / "tum.txt");
-  expect_near(found->poses, poses, 1e-8);
-  EXPECT_THAT(found->timestamps_s, ::testing::Pointwise(::testing::DoubleNear(1e-9), times_s));
-}
-
-TEST(PoseFile, FormatsAreToldByTheirRows) {
-  const TempFolder folder;
-  const auto kitti = read_pose_file(folder.file("a", "1 0 0 5 0 1 0 6 0 0 1 7\n"));
-  EXPECT_THAT(kitti->timestamps_s, IsEmpty());
-  const auto tum = read_pose_file(folder.file("b", "# t x y z\n\n3.5 5 6 7 0 0 0 1 # here\n"));
-  EXPECT_THAT(tum->timestamps_s, ElementsAre(3.5));
-  EXPECT_FALSE(tum->is_of_body);
-  const auto euroc = read_pose_file(folder.file("c", "#t [ns],x\n3500000000,5,6,7, 0,1,0,0, 9\n"));
-  EXPECT_THAT(euroc->timestamps_s, ElementsAre(3.5));
-  EXPECT_TRUE(euroc->is_of_body);
-  EXPECT_EQ(euroc->poses[0].rotation.x(), 1.0) << "w comes first";
-  const auto commas = read_pose_file(folder.file("d", "3.5,5,6,7,0,0,0,1 # a, b\n"));
-  EXPECT_EQ(commas->poses[0].rotation.w(), 1.0);
-  for (const auto& file : {*kitti, *tum, *euroc, *commas}) {
-    EXPECT_EQ(file.poses.at(0).translation, Eigen::Vector3d(5, 6, 7));
   }
 }
 
@@ -299,9 +208,6 @@ TEST(PoseFile, ErrorsNameFileAndLine) {
 TEST(PoseFile, NumbersBetweenCommasAndNamesInComments) {
   const TempFolder folder;
   const auto read = [&](const std::string& text) { return read_pose_file(folder.file("p", text)); };
-  const auto kitti = read("1,0,0,5,0,1,0,6,0,0,1,7\n");
-  EXPECT_THAT(kitti->timestamps_s, IsEmpty());
-  EXPECT_EQ(kitti->poses[0].translation, Eigen::Vector3d(5, 6, 7));
   EXPECT_THAT(read("1700000000500000000,5,6,7,0,0,0,1\n").error().message,
               AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's")));
   EXPECT_THAT(message_of(read("#t [s], q_RS_w, q_RS_x\n1.25,5,6,7,1,0,0,0\n")),

@@ -69,22 +69,6 @@ ChannelImage textured(int shift_px) {
   return image;
 }
 
-TEST_P(FrontEndTest, FindsNoPointsWhereItIsMasked) {
-  const auto num_below = [&](const cv::Mat& mask) {
-    const auto front_end = create_front_end({.method = GetParam()});
-    front_end->set_mask(mask);
-    (void)front_end->process(textured(0));
-    const Matches matches = front_end->process(textured(1));
-    EXPECT_GT(matches.prev_uv.size(), 20U);
-    return std::count_if(matches.prev_uv.begin(), matches.prev_uv.end(),
-                         [](const Eigen::Vector2d& uv) { return uv.y() >= 202.0; });
-  };
-  cv::Mat mask(300, 480, CV_8UC1, cv::Scalar(255));
-  mask.rowRange(200, 300) = 0;  // of the input
-  EXPECT_GT(num_below({}), 10);
-  EXPECT_EQ(num_below(mask), 0);
-}
-
 TEST_P(FrontEndTest, APartOfOneImageEndsTheTracksThereAndBeginsNone) {
   cv::Mat all_but_left(300, 480, CV_8UC1, cv::Scalar(1));
   all_but_left.colRange(0, 100) = 0;

@@ -3,7 +3,6 @@
 
 #include "io/image_file.hpp"
 #include "io/png.hpp"
-#include "support/shared_data.hpp"
 #include "support/test.hpp"
 
 namespace stemvo::io {
@@ -238,49 +237,6 @@ TEST(PngFile, WhatIsEncodedHasThePixels) {
           decode_png({reinterpret_cast<const std::uint8_t*>(png.data()), png.size()}, "a.png",
                      type == CV_8UC3);
       EXPECT_TRUE(is_same(*decoded, image));
-    }
-  }
-}
-
-TEST(PngFile, ErrorsNameTheFile) {
-  const TempFolder folder;
-  const Bytes png = encoded(png_of(test_image(CV_8UC1), {4}));
-  const std::string sound(png.begin(), png.end());
-  std::string damaged = sound;
-  damaged[damaged.size() / 2] ^= 0x55;
-  const std::vector<std::pair<std::string, std::string>> cases = {
-      {"", "found an empty file"},
-      {"GIF89a and more", "found another kind of file"},
-      {sound.substr(0, sound.size() - 13), "found one damaged or cut off"},
-      {damaged, "found one damaged or cut off"}};
-  for (const auto& [contents, wanted] : cases) {
-    const Expected<cv::Mat> image = read_image(folder.file("b.png", contents), false);
-    EXPECT_THAT(image.error().message, HasSubstr("b.png: expected"));
-    EXPECT_THAT(image.error().message, HasSubstr(wanted));
-  }
-  EXPECT_THAT(read_image(folder / "none.png", true).error().message, HasSubstr("cannot read: "));
-}
-
-/// The header is enough: the pixels are not decoded.
-TEST(PngFile, AnotherSizeThanIsWantedIsRefused) {
-  const TempFolder folder;
-  const Bytes png = encoded({8, 0, 9000, 8000, Bytes(10), {}});
-  const auto file = folder.file("a.png", {png.begin(), png.end()});
-  EXPECT_EQ(read_image(file, false, cv::Size(620, 188)).error().message,
-            file.string() + ": expected an image of 620x188 pixels, found 8000x9000");
-}
-
-TEST(PngFile, RealFramesHaveTheBytesOpenCvGives) {
-  STEMVO_NEEDS_SHARED_DATA();
-  for (const char* name : {"03/image_0", "02/image_2"}) {
-    const bool is_color = std::string(name).ends_with("2");
-    for (int i = 0; i < 20; ++i) {
-      const auto file = shared_data() / "kitti/sequences" / name / fmt::format("{:06}.png", i);
-      std::ifstream in(file, std::ios::binary);
-      const Bytes png{std::istreambuf_iterator<char>(in), {}};
-      const cv::Mat image = decode_plain_png(png, is_color);
-      ASSERT_FALSE(image.empty()) << file << " is not one of the quick kind";
-      EXPECT_TRUE(is_same(image, by_opencv(png, is_color))) << file;
     }
   }
 }

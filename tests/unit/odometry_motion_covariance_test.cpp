@@ -43,22 +43,6 @@ void expect_covariances(const std::vector<FrameResult>& results) {
   }
 }
 
-TEST(MotionCovariance, IsHonestWhateverTheNoiseOfTheTracks) {
-  const Rigid3 bend(so3_exp({0.0, 0.01, 0.002}), {0.02, 0.0, 1.0});
-  const std::vector<Rigid3> path = DriveTracks::repeat(bend, 80);
-  for (const double noise_px : {0.05, 0.6}) {
-    const DriveTracks drive(path, points_along(path, 3000, 8), noise_px, 8);
-    WindowEstimator estimator(config_without_scale(), drive.camera);
-    EstimatorRun run(estimator, drive);
-    run.add_all();
-    const MotionErrors errors = errors_of(run.results, path);
-    EXPECT_GT(errors.count, 60) << noise_px;
-    EXPECT_GT(errors.mean, 0.3) << noise_px;  // adjustments move much where tracks are bad
-    EXPECT_LT(errors.mean, 1.6) << noise_px;
-    EXPECT_GT(errors.inside, 0.85) << noise_px;
-  }
-}
-
 /// A hand that hardly moves: by the motion model as much as by the images.
 TEST(MotionCovariance, IsHonestWhereThereIsHardlyAnyParallax) {
   std::vector<Rigid3> path;

@@ -101,18 +101,6 @@ TEST(MotionChain, LowParallaxKeepsTheDirectionAndStationaryStays) {
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.5, 1e-12);
 }
 
-TEST(MotionChain, AMissingImageIsBridged) {
-  Chain chain = make_chain();
-  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
-  chain.add_missing();
-  EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
-  chain.add(driven(Eigen::Vector3d::UnitZ(), 4.0));  // from the last image, two frames away
-  EXPECT_NEAR(chain.world_from_camera().translation.z(), 3.0, 1e-12);
-  MeasuredMotion lost;
-  EXPECT_EQ(chain.add(lost), FrameState::kLost);
-  EXPECT_NEAR(chain.world_from_camera().angle_rad(), 6.0 * kDeg, 1e-9);  // half the turn more
-}
-
 TEST(MotionChain, AStepIsAsLongAsItsIntervalAndALostFrameTurnsOnForIt) {
   Chain chain = make_chain();
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));  // one step in 0.1 s

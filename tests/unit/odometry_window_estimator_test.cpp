@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "support/driven.hpp"
-#include "support/road_drive.hpp"
 #include "support/test.hpp"
 
 namespace stemvo {
@@ -99,41 +98,6 @@ TEST(WindowEstimator, AMissingImageWhileInitializingIsNoEnd) {
   d.add_range(5, 90);
   EXPECT_EQ(d.run.count(FrameState::kLost), 0);
   EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
-}
-
-// A cut to another place: the road's scale belonged to the map before.
-TEST(WindowEstimator, ALossAndTheNewMapSaySo) {
-  const RoadDrive drive(24);
-  WindowEstimator estimator(metric_config(), drive.scene.camera);
-  EstimatorRun run(estimator, drive.tracks);
-  run.road = [&](int i) { return drive.road_image(i, true); };
-  run.add_range(0, 10);
-  EXPECT_EQ(run.results.back().scale_state, ScaleState::kMeasured);
-  const FrameResult lost = run.add_matches({}, 10);
-  EXPECT_EQ(lost.state, FrameState::kLost);
-  EXPECT_EQ(lost.num_inliers, 0);
-  EXPECT_NE(lost.scale_state,
-            ScaleState::kMeasured);  // a motion that was not measured measures no road
-  EXPECT_GE(lost.scale_sigma.value(), run.results[9].scale_sigma.value());
-  bool is_new_map = false;
-  for (int i = 11; i < 24; ++i) {
-    const FrameResult result = run.add_matches(drive.tracks.other_matches(i), i);
-    EXPECT_NE(result.state, FrameState::kLost) << i;
-    if (result.state == FrameState::kInitializing) {  // the old map's scale is not the new one's
-      EXPECT_NE(result.scale_state, ScaleState::kHeld) << i;
-    }
-    if (!is_new_map && result.state == FrameState::kTracking) {
-      is_new_map = true;
-      EXPECT_EQ(run.results[static_cast<std::size_t>(i) - 1].state, FrameState::kInitializing);
-    }
-  }
-  EXPECT_TRUE(is_new_map);
-  EXPECT_EQ(run.results.back().scale_state, ScaleState::kMeasured)
-      << run.results.back().road_reason;
-  const double step = (run.results[23].world_from_camera.translation -
-                       run.results[22].world_from_camera.translation)
-                          .norm();
-  EXPECT_NEAR(step, RoadDrive::kStep_m, 0.03 * RoadDrive::kStep_m);
 }
 
 TEST(WindowEstimator, SaysWhichMapAndWhereItsUnitBegins) {

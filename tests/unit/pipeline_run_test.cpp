@@ -210,14 +210,9 @@ TEST_F(PipelineRun, AFileWhoseTimesMissAllFramesIsAWarning) {
   EXPECT_THAT(warnings_with("-1 0 0 0\n0.2 0 0 0\n"), Not(Contains(HasSubstr("--gyro"))));
 }
 
-TEST_F(PipelineRun, ReplacesItsOwnFolderAndNoOther) {
+TEST_F(PipelineRun, ReplacesItsOwnFilesAndNoOthers) {
   request_.config.odometry.mode = OdometryMode::kTwoFrame;  // no map
   request_.config.scale.source = ScaleSource::kConstantSpeed;
-  fs::create_directories(request_.out_dir);
-  std::ofstream(request_.out_dir / "map.ply") << "somebody's";
-  EXPECT_THAT(error_of(request_), HasSubstr("expected a new folder, an empty one or results of"));
-  EXPECT_EQ(read_all(request_.out_dir / "map.ply"), "somebody's");
-  fs::remove(request_.out_dir / "map.ply");
   request_.image_every = 1;
   ASSERT_TRUE(run_sequence(request_));
   EXPECT_TRUE(fs::exists(request_.out_dir / "pictures/000001.png"));
@@ -292,16 +287,6 @@ TEST_F(PipelineRun, StoppingAfterTheLastFrameIsNoInterrupt) {
       run_sequence(request_, [](std::size_t done, std::size_t total) { return done < total; });
   ASSERT_TRUE(summary);
   EXPECT_FALSE(summary->interrupted);
-}
-
-TEST_F(PipelineRun, BrokenFrameIsAWarningWithItsFile) {
-  request_.config.scale_choice = ScaleChoice::kOptions;
-  fs::resize_file(request_.sequence_dir / "image_0/000003.png", 200);
-  const auto summary = run_sequence(request_);
-  EXPECT_THAT(summary->warnings, ElementsAre(HasSubstr("000003.png")));
-  EXPECT_EQ(summary->report.num_frames, 6U);
-  EXPECT_LT(summary->report.tracked_fraction, 1.0);
-  EXPECT_THAT(read_all(request_.out_dir / "frames.csv"), HasSubstr(",no_image,"));
 }
 
 TEST_F(PipelineRun, IsScoredFromWhereTheCameraStarts) {

@@ -96,11 +96,6 @@ TEST(FrameImage, StandsUnderItsCaption) {
   EXPECT_EQ(describe_flow({}, {}), "");
 }
 
-TEST(FrameImage, SaysThatItCannotBeWritten) {
-  EXPECT_THAT(message_of(write_image("/nonexistent/a.png", gray_frame())),
-              HasSubstr("/nonexistent/a.png: cannot write"));
-}
-
 TEST(ChannelSheet, ShowsEveryChannelUnderItsName) {
   std::vector<cv::Mat> images = {gray_frame()};
   for (const int gray : {20, 200, 77}) {

@@ -73,14 +73,6 @@ TEST_F(RunPageTest, HoldsTheMapsPathAndItsLoops) {
   EXPECT_EQ(page["map"]["loops"], json({{3, 180}}));
 }
 
-TEST_F(RunPageTest, WithoutGroundTruthThereIsNone) {
-  truth_.reset();
-  report_.metrics.reset();
-  const json page = content();
-  EXPECT_TRUE(page["truth"].is_null());
-  EXPECT_TRUE(page["metrics"]["segments"].is_null());
-}
-
 std::vector<std::size_t> rows_of(const SmallFrames& frames) {
   std::vector<std::size_t> rows;
   for (const html::CaptionedImage& kept : frames.images()) {

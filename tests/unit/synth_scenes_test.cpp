@@ -221,19 +221,6 @@ TEST(TrafficMask, IsWhereTheImageChangesWhileTheCameraStands) {
   EXPECT_GE(stands, 2);
 }
 
-/// Driving, the rest follows depth and poses.
-TEST(TrafficMask, LeavesWhatFollowsTheStillScene) {
-  for (const std::uint64_t seed : {1U, 4U}) {
-    const Renderer renderer = with_traffic(make_own_drive(60, seed, true), seed);
-    for (const std::size_t i : {5U, 40U}) {
-      Differences differences(renderer, i);
-      EXPECT_LT(median(differences.still), 6.0) << "seed " << seed << ", frame " << i;
-      EXPECT_GT(median(differences.moving), 1.5 * median(differences.still))
-          << "seed " << seed << ", frame " << i;
-    }
-  }
-}
-
 TEST(TrafficTest, FillsAThirdOfTheImageFromTheFirstFrameOn) {
   int lorries = 0;
   double most = 0.0;

@@ -74,25 +74,5 @@ TEST(Timing, ThreadsAreSeenAndSharesAddUp) {
   EXPECT_GE(report.rest_cpu_s, -1e-3) << "the stages have more time than the program";
 }
 
-TimingReport example() {
-  TimingReport report{.stages = {{"stem", 400, 3.25, 4.5, 1.5}, {"tracking", 399, 5.0, 7.0, 2.0}},
-                      .rest_cpu_s = 0.5,
-                      .cpu_s = 4.0,
-                      .fps = 180.0,
-                      .num_frames = 400,
-                      .num_threads = 2,
-                      .peak_memory_mib = 222.4};
-  return report;
-}
-
-TEST(Timing, TableHasARowPerStageAndTheWhole) {
-  const std::string table = format_timing_table(example());
-  EXPECT_THAT(table, ContainsRegex("stem +400 +3\\.250 +4\\.500 +3\\.750 +37\\.5\n"));
-  EXPECT_THAT(table, ContainsRegex("tracking +399 +5\\.000 +7\\.000 +5\\.000 +50\\.0\n"));
-  EXPECT_THAT(table, ContainsRegex("processor time +10\\.000 +100\\.0\n"));
-  EXPECT_THAT(table, HasSubstr("\n180.0 frames/s, 400 frames, 2 threads, 222 MiB at most\n"));
-  EXPECT_THAT(table, Not(HasSubstr(" \n"))) << "blanks at the end of a line";
-}
-
 }  // namespace
 }  // namespace stemvo

@@ -24,8 +24,3 @@ def test_every_row_of_a_rendered_drive(tmp_path):
         assert told or found[0].count(" / ") == 4, found[0]  # two sequences' columns, of three errors
     # Every build can run the defaults.
     assert re.search(r"(\| \d+\.\d\d( / \d+\.\d\d){2} ){2}\|$", next(line for line in lines if line.startswith("| the defaults")))
-
-
-def test_a_sequence_that_is_not_there_is_wrong_usage(tmp_path):
-    done = subprocess.run([sys.executable, TOOL, tmp_path, "--out", tmp_path / "x"], capture_output=True, text=True, check=False)
-    assert done.returncode == 2 and "expected a sequence folder" in done.stderr

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""tools/long_drives.py: what is rendered is kept, what changed is rendered anew, runs are watched; tools/planted_camera.py: a row per calibration."""
+"""tools/long_drives.py: a row per drive, runs are watched; tools/planted_camera.py: a row per calibration."""
 
 import contextlib
 import json
@@ -8,7 +8,7 @@ import pathlib
 import subprocess
 import sys
 
-from drives import rendered, watched_run
+from drives import watched_run
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PROGRAM = os.environ["STEMVO_PROGRAM"]
@@ -24,20 +24,6 @@ def write_poses(file, count):
 def tool(name, *arguments):
     command = [sys.executable, str(ROOT / "tools" / name), "--program", PROGRAM, *map(str, arguments)]
     return subprocess.run(command, check=False, capture_output=True, text=True)
-
-
-def test_is_rendered_once_and_half_a_rendering_is_not_kept(tmp_path):
-    write_poses(tmp_path / "31.txt", 9)
-    drive = rendered.Drive(tmp_path / "31.txt", 96, 48)
-    folder = rendered.render(PROGRAM, tmp_path / "cache", drive)
-    frames = sorted((folder / "sequences/00/image_2").iterdir())
-    assert len(frames) == len((folder / "poses/00.txt").read_text().splitlines()) == 9
-    before = frames[3].stat().st_mtime_ns
-    assert rendered.render(PROGRAM, tmp_path / "cache", drive) == folder and frames[3].stat().st_mtime_ns == before
-    (folder / rendered.RENDERED).unlink()  # as an interrupt leaves it
-    frames[4].unlink()
-    rendered.render(PROGRAM, tmp_path / "cache", drive)
-    assert frames[4].exists()
 
 
 def test_a_growing_process_shows_in_the_second_half():
