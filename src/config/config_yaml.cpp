@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include <fmt/ranges.h>
-#include <yaml-cpp/emitfromevents.h>
+#include <yaml-cpp/eventhandler.h>
 
 #include "text/text_file.hpp"
 #include "try.hpp"
@@ -75,12 +75,28 @@ std::string_view kind_of(const YAML::Node& node) {
 
 /// Finds where documents begin: YAML::Load reads the first and leaves out others without a word,
 /// and YAML::LoadAll never ends on some texts.
-class DocumentLines final : public YAML::EmitFromEvents {
+class DocumentLines final : public YAML::EventHandler {
  public:
-  using YAML::EmitFromEvents::EmitFromEvents;
-  void OnDocumentStart(const YAML::Mark& mark) override { lines.push_back(mark.line + 1); }
-
   std::vector<int> lines;
+
+  void OnDocumentStart(const YAML::Mark& mark) override { lines.push_back(mark.line + 1); }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&,
+                const std::string&,
+                YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&,
+                       const std::string&,
+                       YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&,
+                  const std::string&,
+                  YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
 };
 
 }  // namespace
@@ -124,8 +140,7 @@ Expected<YAML::Node> parse_document(const std::string& text, std::string_view so
   try {
     std::istringstream stream(text);
     YAML::Parser parser(stream);
-    YAML::Emitter unused;
-    DocumentLines documents(unused);
+    DocumentLines documents;
     if (parser.HandleNextDocument(documents) && parser.HandleNextDocument(documents)) {
       return fail(fmt::format("{}:{}: not YAML: expected one document, found more behind it",
                               source, documents.lines.back()));
