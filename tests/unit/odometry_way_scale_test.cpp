@@ -237,15 +237,6 @@ TEST(ScaleFilter, AnyRateOfFramesTellsTheSameInTheSameTime) {
   }
 }
 
-TEST(ScaleFilter, WithoutJoiningEachMeasurementStandsAlone) {
-  ScaleFilter filter(kDriftSigma, /*joins_frames=*/false);
-  for (const double log_scale : {0.0, 1.0, -0.5}) {
-    filter.predict(kInterval_s);
-    EXPECT_TRUE(filter.update(log_scale, kSigma, kRoad));
-    EXPECT_EQ(filter.log_scale(), log_scale);
-  }
-}
-
 // Both in turn, each sure of itself: the road's plane may be a table, a way is one.
 TEST(ScaleFilter, AWayThatContradictsTheRoadWinsAndKeepsWinning) {
   ScaleFilter filter(kDriftSigma);
