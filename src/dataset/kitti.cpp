@@ -152,6 +152,10 @@ Expected<int> choose_camera(const fs::path& directory, const std::string& option
     return option == "auto" ? index % 2 == 0 && is_there(index)
                             : option == fmt::format("image_{}", index);
   });
+  if (found == kOrder.end() && option != "auto") {
+    return fail(
+        fmt::format("input.camera: expected auto or image_0 .. image_3, found '{}'", option));
+  }
   if (found == kOrder.end() || !is_there(*found)) {
     return fail(fmt::format("{}: expected a folder {}, found none", directory.string(),
                             option == "auto" ? "image_2 or image_0" : option));
