@@ -76,8 +76,10 @@ class FrontEnd {
   virtual void remove_outliers(const std::vector<char>& is_inlier) = 0;
   /// Takes the projections of landmarks into the last image (also outside of it) whose tracks
   /// ended; process() matches them there before it looks for new corners. Called after
-  /// remove_outliers(); a track that is not named is forgotten.
-  virtual void expect_projections(Observations /*projections*/) {}  // NOLINT: an override keeps it
+  /// remove_outliers(); a track that is not named is forgotten, and one that is not found, unless
+  /// something `may_hide` it.
+  virtual void expect_projections(Observations /*projections*/,  // NOLINT: an override keeps it
+                                  bool /*may_hide*/) {}
 
  protected:
   /// Both masks.

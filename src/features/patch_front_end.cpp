@@ -285,7 +285,8 @@ class PatchFrontEnd final : public PointFrontEnd {
   }
 
   [[nodiscard]] std::optional<cv::Point2f> match_projection(const ImagePyramid& image,
-                                                            const Point& point) override {
+                                                            const Point& point,
+                                                            bool may_be_hidden) override {
     const auto known = tracks_.find(point.id);
     if (known == tracks_.end()) {
       return std::nullopt;
@@ -297,7 +298,9 @@ class PatchFrontEnd final : public PointFrontEnd {
     const cv::Point2f uv(found.warp.x, found.warp.y);
     const cv::Point2f off = uv - point.uv;
     if (found.correlation < kMinAgain || off.dot(off) > kMaxOff_px * kMaxOff_px) {
-      ended_.push_back(tracks_.extract(known));
+      if (!may_be_hidden) {
+        ended_.push_back(tracks_.extract(known));
+      }
       return std::nullopt;
     }
     track.warp = found.warp;

@@ -128,7 +128,8 @@ void PointFrontEnd::match_projections(View& view) {
     if (!inside.contains(start)) {
       continue;
     }
-    if (const auto found = match_projection(*view.image, {start, expected.track_id})) {
+    if (const auto found =
+            match_projection(*view.image, {start, expected.track_id}, may_be_hidden_)) {
       view.points.push_back({*found, expected.track_id});
     }
   }

@@ -24,8 +24,9 @@ class PointFrontEnd : public FrontEnd {
   [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image,
                                 const ImageClue& clue) override;
   void remove_outliers(const std::vector<char>& is_inlier) override;
-  void expect_projections(Observations projections) override {
+  void expect_projections(Observations projections, bool may_hide) override {
     projections_ = std::move(projections);
+    may_be_hidden_ = may_hide;
   }
   /// Where new points may begin: pixels of the image, strongest first. `mask`: of the level that
   /// they are looked for on, 0 where none; empty: everywhere.
@@ -64,9 +65,11 @@ class PointFrontEnd : public FrontEnd {
   /// Where the points of `from` are in the next view, which has no points yet; nullopt: not found.
   [[nodiscard]] virtual std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                              View& to) = 0;
-  /// A track that ended, near `point` of the image; nullopt: it is not there.
+  /// A track that ended, near `point` of the image; nullopt: it is not there, and no more looked
+  /// for, unless it `may_be_hidden`.
   [[nodiscard]] virtual std::optional<cv::Point2f> match_projection(const ImagePyramid& /*image*/,
-                                                                    const Point& /*point*/) {
+                                                                    const Point& /*point*/,
+                                                                    bool /*may_be_hidden*/) {
     return std::nullopt;
   }
   /// No track but those of these, each ordered by id, goes on.
@@ -84,6 +87,7 @@ class PointFrontEnd : public FrontEnd {
   View last_;
   View last_good_;            ///< the one before nearly every track ended; none otherwise
   Observations projections_;  ///< in last_; empty once they were matched
+  bool may_be_hidden_ = false;
   int next_id_ = 0;
 };
 

@@ -122,7 +122,8 @@ void ChannelOdometry::localize() {
   lens_ = estimator_->lens();
   if (work.frame.has_image()) {
     front_end_->remove_outliers(kept_tracks(work.localized));
-    front_end_->expect_projections(std::move(work.localized.projections));
+    front_end_->expect_projections(std::move(work.localized.projections),
+                                   work.localized.may_be_hidden);
     work.frame.times.pose_ms = watch.lap_ms();
   }
 }

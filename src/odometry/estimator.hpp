@@ -53,6 +53,7 @@ struct LocalizedFrame {
   std::vector<char> inlier_mask;  ///< one per match: it agrees with the motion
   std::vector<char> moving_mask;  ///< one per match, or none: it moves on its own, no inlier
   Observations projections;       ///< of the landmarks without an inlier in this frame
+  bool may_be_hidden = false;     ///< these are, behind what passes a camera that stands
   /// Motions that two views tell: MeasuredMotion::covariance of what is added to the pose before.
   std::optional<Matrix6d> two_view = std::nullopt;
 };

@@ -155,9 +155,7 @@ Matrix6d MotionCovariance::finish(const Motion& motion) {
     covariance = track_noise_.value_or(own + pose) + map_term(motion.state);
     pose = own;
     if (motion.fused.has_value()) {
-      const Matrix6d& gain = motion.fused->gain;
-      covariance = transformed(covariance, gain) +
-                   transformed(motion.fused->expected, Matrix6d::Identity() - gain);
+      covariance = transformed(covariance, motion.fused->gain) + motion.fused->rest;
     }
   }
   covariance += principal_point_term(motion, to_cur) + scale_term(motion);

@@ -28,6 +28,28 @@ Vector6d six_of(const Rigid3& prev_from_cur) {
 
 Rigid3 motion_of(const Vector6d& six) { return {so3_exp(six.tail<3>()), six.head<3>()}; }
 
+struct Held {
+  Rigid3 prev_from_cur;
+  Matrix6d share = Matrix6d::Identity();  ///< of the measurement
+  Matrix6d added = Matrix6d::Zero();      ///< covariance of the rest
+};
+
+/// The measurement, its position by the hold as far as that is the surer one (Kalman's update).
+Held hold_position(const Rigid3& measured,
+                   const Matrix6d& noise,
+                   const std::optional<MotionModel::Hold>& hold) {
+  Held held{.prev_from_cur = measured};
+  if (hold.has_value()) {
+    const Eigen::Matrix3d of_hold = hold->sigma * hold->sigma * Eigen::Matrix3d::Identity();
+    const Eigen::Matrix<double, 6, 3> gain =
+        noise.leftCols<3>() * (noise.topLeftCorner<3, 3>() + of_hold).inverse();
+    held.prev_from_cur = measured * motion_of(gain * (measured.inverse() * hold->at));
+    held.share.leftCols<3>() -= gain;
+    held.added = gain * of_hold * gain.transpose();
+  }
+  return held;
+}
+
 }  // namespace
 
 void Persistence::add(const Eigen::Vector3d& velocity, double interval_s) {
@@ -69,22 +91,24 @@ Vector6d MotionModel::faded(double interval_s) const {
 }
 
 MotionModel::Fused MotionModel::fuse(const Rigid3& measured,
-                                     const Matrix6d& noise,
+                                     const Matrix6d& of_measured,
                                      double weight,
-                                     double interval_s) {
+                                     double interval_s,
+                                     const std::optional<Hold>& hold) {
   const double t = interval_s;
+  const Held held = hold_position(measured, of_measured, hold);
+  const Matrix6d noise = held.share * of_measured * held.share.transpose() + held.added;
   if (!is_fused_) {  // the velocity is the difference of two poses
     covariance_ << noise, noise / t, noise / t, 2.0 / (t * t) * noise;
   }
   advance(t);
   const Rigid3 predicted = predict(t);
-  const Vector6d off = six_of(predicted.inverse() * measured);
+  const Vector6d off = six_of(predicted.inverse() * held.prev_from_cur);
   learn(off, noise, t);
   Vector6d diagonal;
   diagonal << Eigen::Vector3d::Constant(pushes_[0]), Eigen::Vector3d::Constant(pushes_[1]);
   const Matrix6d push = diagonal.cwiseMax(0.0).asDiagonal();
-  Fused fused;
-  fused.expected = t * t * covariance_.bottomRightCorner<6, 6>() + t * t * t / 3.0 * push;
+  const Matrix6d expected = t * t * covariance_.bottomRightCorner<6, 6>() + t * t * t / 3.0 * push;
   Matrix12d pushed;
   pushed << t * t * t / 3.0 * push, t * t / 2.0 * push, t * t / 2.0 * push, t * push;
   covariance_ += pushed;
@@ -98,8 +122,13 @@ MotionModel::Fused MotionModel::fuse(const Rigid3& measured,
   Matrix12d left = Matrix12d::Identity();
   left.leftCols<6>() -= gain;
   covariance_ = left * covariance_ * left.transpose() + gain * noise * gain.transpose();
-  fused.gain = gain.topRows<6>();
-  fused.prev_from_cur = predicted * motion_of(fused.gain * off);
+  Fused fused;
+  const Matrix6d of_pose = gain.topRows<6>();
+  fused.prev_from_cur = predicted * motion_of(of_pose * off);
+  fused.gain = of_pose * held.share;
+  const Matrix6d of_prediction = Matrix6d::Identity() - of_pose;
+  fused.rest = of_prediction * expected * of_prediction.transpose() +
+               of_pose * held.added * of_pose.transpose();
   velocity_ += gain.bottomRows<6>() * off;
   is_fused_ = true;
   return fused;

@@ -47,7 +47,12 @@ class MotionModel {
   struct Fused {
     Rigid3 prev_from_cur;
     Matrix6d gain = Matrix6d::Identity();  ///< the share of the measurement
-    Matrix6d expected = Matrix6d::Zero();  ///< covariance of the prediction's motion
+    Matrix6d rest = Matrix6d::Zero();      ///< covariance by all that is not the measurement
+  };
+  /// A position that is known from elsewhere, in the camera before, with a sigma per axis.
+  struct Hold {
+    Eigen::Vector3d at;
+    double sigma = 0.0;
   };
 
   /// The motion in so many seconds. `turned`: its rotation where that is known from elsewhere.
@@ -62,7 +67,8 @@ class MotionModel {
   [[nodiscard]] Fused fuse(const Rigid3& measured,
                            const Matrix6d& noise,
                            double weight,
-                           double interval_s);
+                           double interval_s,
+                           const std::optional<Hold>& hold = {});
   /// The motion of a frame that was measured is final; `is_fused`: by fuse().
   void measured(const Rigid3& prev_from_cur, double interval_s, bool is_fused);
   /// No motion was measured: the prediction was taken.

@@ -101,18 +101,24 @@ double median_flow_px(const PixelPairs& pairs) {
       lengths_of(pairs, [](const auto& prev, const auto& cur) { return (cur - prev).norm(); }));
 }
 
-bool is_stationary(const Observations& before,
-                   const Observations& now,
-                   double min_flow_px,
-                   int min_tracks) {
+std::optional<double> stationary_flow_px(const Observations& before,
+                                         const Observations& now,
+                                         double min_flow_px,
+                                         int min_tracks) {
   const PointPairs pairs = common_points(before, now);
   std::vector<char> stays(pairs.prev_uv.size());
+  std::vector<double> flows_px;
   for (std::size_t i = 0; i < stays.size(); ++i) {
-    stays[i] = (pairs.cur_uv[i] - pairs.prev_uv[i]).norm() < min_flow_px ? 1 : 0;
+    const double flow_px = (pairs.cur_uv[i] - pairs.prev_uv[i]).norm();
+    stays[i] = flow_px < min_flow_px ? 1 : 0;
+    if (stays[i] != 0) {
+      flows_px.push_back(flow_px);
+    }
   }
   const std::vector<char> all(stays.size(), 1);
-  return pairs.size() >= min_tracks &&
-         2.0 * cell_votes(pairs.prev_uv, stays) > cell_votes(pairs.prev_uv, all);
+  const bool is_stationary = pairs.size() >= min_tracks && 2.0 * cell_votes(pairs.prev_uv, stays) >
+                                                               cell_votes(pairs.prev_uv, all);
+  return is_stationary ? std::optional(median(std::move(flows_px))) : std::nullopt;
 }
 
 double median_parallax_px(const Eigen::Quaterniond& rotation,

@@ -58,12 +58,12 @@ template <typename T>
 [[nodiscard]] double median_flow_px(const PixelPairs& pairs);
 
 /// The tracks stay where they were, with less flow than `min_flow_px`, in more than half of the
-/// image: by its cells, so that who stands still does not follow those who pass by. False where the
-/// two share fewer than `min_tracks`.
-[[nodiscard]] bool is_stationary(const Observations& before,
-                                 const Observations& now,
-                                 double min_flow_px,
-                                 int min_tracks);
+/// image: by its cells, so that who stands still does not follow those who pass by. Then the median
+/// flow of those that stay; nullopt also where the two share fewer than `min_tracks`.
+[[nodiscard]] std::optional<double> stationary_flow_px(const Observations& before,
+                                                       const Observations& now,
+                                                       double min_flow_px,
+                                                       int min_tracks);
 
 /// Flow that the rotation, cur_from_prev, does not explain.
 [[nodiscard]] double median_parallax_px(const Eigen::Quaterniond& rotation,

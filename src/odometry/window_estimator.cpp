@@ -25,6 +25,8 @@ constexpr double kMinLandmarkShare = 0.3;
 constexpr double kMinExplained = 0.5;
 /// A camera that was still is believed to move from so many times the flow on.
 constexpr double kHysteresis = 1.5;
+/// Tracks that do not move are right to so much.
+constexpr double kHiddenFlow_px = 0.05;
 /// So many times the flow of a stationary frame is what errors of landmarks do to one that turns.
 constexpr double kTurnFlow = 3.0;
 /// Who stood is believed to stand for so long where things that pass hide the world.
@@ -70,8 +72,9 @@ LocalizedFrame WindowEstimator::localize(const Frame& frame) {
   result.num_matches = static_cast<int>(mask.size());
   result.num_inliers = static_cast<int>(std::count(mask.begin(), mask.end(), char{1}));
   if (frame.has_image() && !is_initializing_) {
-    localized.projections =
-        project_lost_landmarks(window_, world_from_camera_, view_.points, camera());
+    const Observations& seen = result.state == FrameState::kLost ? Observations() : view_.points;
+    localized.projections = project_lost_landmarks(window_, world_from_camera_, seen, camera());
+    localized.may_be_hidden = stood_;
   }
   return localized;
 }
@@ -88,11 +91,11 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
     return FrameState::kFirst;
   }
   std::optional<StageTimer> timer;
-  bool is_still = false;
+  std::optional<double> still_px;
   const Observations now = current_points(frame.matches, localized.inlier_mask);
   if (!is_initializing_) {
     timer.emplace(Stage::kLocalization);
-    is_still = is_stationary(moving_points_, now, min_flow_px(), options_.min_inliers);
+    still_px = stationary_flow_px(moving_view_.points, now, min_flow_px(), options_.min_inliers);
   }
   const SeenLandmarks seen = find_seen_landmarks(window_, now);
   Rigid3 start = predict();
@@ -105,13 +108,13 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   if (found.has_value()) {
     const Rigid3 of_world =
         pose_without_thing(frame, seen, found->world_from_camera, localized.inlier_mask);
-    return accept_localization(frame, of_world, is_still, localized);
+    return accept_localization(frame, of_world, still_px, localized);
   }
-  if (is_still) {  // few landmarks, but nothing moves
+  if (still_px) {  // few landmarks, but nothing moves
     return FrameState::kStationary;
   }
   if (relocate(frame, now, start)) {
-    return accept_localization(frame, Rigid3(world_from_camera_), false, localized);
+    return accept_localization(frame, Rigid3(world_from_camera_), {}, localized);
   }
   if (!is_initializing_ && stood_ && frame.time_s - view_.time_s < kHidden_s) {
     // A map on what passes would go where that goes. Landmarks are looked for where they were.
@@ -123,7 +126,7 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
 
 FrameState WindowEstimator::accept_localization(const Frame& frame,
                                                 const Rigid3& found,
-                                                bool is_still,
+                                                const std::optional<double>& still_px,
                                                 LocalizedFrame& localized) {
   is_initializing_ = false;
   const Rigid3 before = std::exchange(world_from_camera_, found);
@@ -138,26 +141,28 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
   Observations now = current_points(frame.matches, localized.inlier_mask);
   const SeenLandmarks seen = find_seen_landmarks(window_, now);
   const double bound_px = min_way_px();
-  const double parallax_px =
-      is_last_localized_
-          ? parallax_since_px(moved_to_, found, seen, camera(), localization_.inlier_bound_px)
-                .value_or(bound_px)
-          : bound_px;
+  double parallax_px = is_last_localized_ ? parallax_since_px(moved_to_, found, seen, camera(),
+                                                              localization_.inlier_bound_px)
+                                                .value_or(bound_px)
+                                          : bound_px;
+  if (still_px) {  // more is an error of the landmarks: few, or all of them far
+    parallax_px = std::min(parallax_px, min_flow_px());
+  }
   const bool has_moved = parallax_px >= bound_px;
   if (has_moved) {
     moved_to_ = found.translation;
   } else if (last_.frame == frame.number - 1) {
-    fuse_with_prediction(before, seen, parallax_px / bound_px);
+    fuse_with_prediction(before, seen, parallax_px / bound_px, still_px);
   }
   const double turn_px =
       camera().mean_focal_px() * view_.world_from_camera.rotation.angularDistance(found.rotation);
   view_ = {frame.number, world_from_camera_, std::move(now), frame.time_s};
   const bool is_nearly_still = !has_moved && turn_px < bound_px;
-  stood_ = is_still || (stood_ && is_nearly_still);
-  if (is_still) {
+  stood_ = still_px || (stood_ && is_nearly_still);
+  if (still_px) {
     return FrameState::kStationary;
   }
-  moving_points_ = view_.points;
+  moving_view_ = view_;
   return has_moved         ? FrameState::kTracking
          : is_nearly_still ? FrameState::kLowParallax
                            : FrameState::kRotating;
@@ -182,12 +187,18 @@ void WindowEstimator::mark_outliers(const Matches& matches,
 /// The less parallax, the more the motion model counts: at `parallax` 1 it does not.
 void WindowEstimator::fuse_with_prediction(const Rigid3& before,
                                            const SeenLandmarks& seen,
-                                           double parallax) {
+                                           double parallax,
+                                           const std::optional<double>& still_px) {
   const Matrix6d noise = pose_influences(world_from_camera_.inverse(), seen.points, seen.uv,
                                          camera(), localization_.loss_px)
                              .squared_sum();
   const double weight = std::pow(1.0 - parallax * parallax, 2);
-  fused_ = motion_.fuse(before.inverse() * world_from_camera_, noise, weight, interval_s_);
+  std::optional<MotionModel::Hold> hold;
+  if (still_px) {  // what so little flow may hide
+    hold = {before.inverse() * moving_view_.world_from_camera.translation,
+            std::max(*still_px, kHiddenFlow_px) * pixel_units(seen)};
+  }
+  fused_ = motion_.fuse(before.inverse() * world_from_camera_, noise, weight, interval_s_, hold);
   world_from_camera_ = before * fused_->prev_from_cur;
 }
 
@@ -280,7 +291,7 @@ bool WindowEstimator::open_window(View view) {
   is_initializing_ = false;
   world_from_camera_ = view.world_from_camera;
   moved_to_ = view.world_from_camera.translation;
-  moving_points_ = view.points;
+  moving_view_ = view;
   view_ = std::move(view);
   return true;
 }

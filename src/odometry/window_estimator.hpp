@@ -85,9 +85,10 @@ class WindowEstimator final : public Estimator {
  private:
   // Localization: what gives the frame its pose and its state.
   FrameState find_pose(const Frame& frame, LocalizedFrame& localized);
+  /// `still_px`: the flow of tracks that stay where they were, of stationary_flow_px().
   FrameState accept_localization(const Frame& frame,
                                  const Rigid3& found,
-                                 bool is_still,
+                                 const std::optional<double>& still_px,
                                  LocalizedFrame& localized);
   /// Share of the image's cells whose matches since the last frame fit a motion well.
   [[nodiscard]] double share_that_fits(const Rigid3& cur_from_last,
@@ -109,7 +110,10 @@ class WindowEstimator final : public Estimator {
                                                              const Matches& matches,
                                                              const std::vector<char>& mask,
                                                              std::vector<char>& thing) const;
-  void fuse_with_prediction(const Rigid3& before, const SeenLandmarks& seen, double parallax);
+  void fuse_with_prediction(const Rigid3& before,
+                            const SeenLandmarks& seen,
+                            double parallax,
+                            const std::optional<double>& still_px);
   /// Nothing is measured: the last motion goes on.
   void go_on(const Frame& frame) { world_from_camera_ = predict(trust_.trusted(frame.hints)); }
   /// Goes on in the map where the frame shows a kept place; false: it shows none.
@@ -153,7 +157,7 @@ class WindowEstimator final : public Estimator {
   /// An old place was recognized: the window keeps to it.
   void take_in(const Recognition& recognition);
   /// Units of motion that move the median landmark in view by a pixel.
-  [[nodiscard]] double pixel_units() const;
+  [[nodiscard]] double pixel_units(const SeenLandmarks& seen) const;
   void measure_scale(const Frame& frame, FrameState state);
   void describe(const Frame& frame, FrameResult& result);
   void measure_covariance(const Frame& frame, LocalizedFrame& localized);
@@ -182,11 +186,11 @@ class WindowEstimator final : public Estimator {
   double assumed_step_;  ///< in the first interval, where nothing measures a length
   std::vector<Eigen::Vector2d> radials_;  ///< of the lenses that frames' pixels were freed of
   HintTrust trust_;
-  double speed_ = 0.0;          ///< of the last step measured or assumed, units per second
-  double interval_s_ = 0.0;     ///< between the frame in work and the one before
-  View last_;                   ///< the last frame with an image, without its points
-  View view_;                   ///< the last frame that was localized
-  Observations moving_points_;  ///< of the last one that was not stationary
+  double speed_ = 0.0;       ///< of the last step measured or assumed, units per second
+  double interval_s_ = 0.0;  ///< between the frame in work and the one before
+  View last_;                ///< the last frame with an image, without its points
+  View view_;                ///< the last frame that was localized
+  View moving_view_;         ///< the last one that was not stationary
   Eigen::Vector3d moved_to_ = Eigen::Vector3d::Zero();  ///< by the last one with parallax
   Rigid3 road_pose_;                    ///< of the last frame whose road was measured
   bool is_last_localized_ = false;      ///< last_ has a pose that was measured

@@ -78,8 +78,8 @@ void WindowEstimator::take_in(const Recognition& recognition) {
     move(window_, moved);
     history_.rescale(moved.scale);
     calibration_.restart();
-    for (Rigid3* pose :
-         {&world_from_camera_, &view_.world_from_camera, &last_.world_from_camera, &road_pose_}) {
+    for (Rigid3* pose : {&world_from_camera_, &view_.world_from_camera,
+                         &moving_view_.world_from_camera, &last_.world_from_camera, &road_pose_}) {
       *pose = moved * *pose;
     }
     moved_to_ = moved * moved_to_;
@@ -136,10 +136,10 @@ void WindowEstimator::measure_covariance(const Frame& frame, LocalizedFrame& loc
   }
 }
 
-double WindowEstimator::pixel_units() const {
+double WindowEstimator::pixel_units(const SeenLandmarks& seen) const {
   const Rigid3 camera_from_world = world_from_camera_.inverse();
   std::vector<double> depths;
-  for (const Eigen::Vector3d& point : find_seen_landmarks(window_, view_.points).points) {
+  for (const Eigen::Vector3d& point : seen.points) {
     depths.push_back((camera_from_world * point).z());
   }
   return depths.empty() ? 0.0 : median(std::move(depths)) / camera().mean_focal_px();
@@ -163,8 +163,9 @@ void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
     // A position that a motion model has a share in tells no length.
     const bool is_shared = state == FrameState::kLowParallax || state == FrameState::kRotating ||
                            state == FrameState::kStationary;
-    const double position_units =
-        is_shared ? std::numeric_limits<double>::infinity() : pixel_units();
+    const double position_units = is_shared
+                                      ? std::numeric_limits<double>::infinity()
+                                      : pixel_units(find_seen_landmarks(window_, view_.points));
     const double factor =
         scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_,
                        frame.time_s, position_units, landmarks);
@@ -175,7 +176,8 @@ void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
       uncertainty_.rescale(factor);
       motion_.rescale(factor);
       for (Eigen::Vector3d* at :
-           {&world_from_camera_.translation, &view_.world_from_camera.translation, &moved_to_}) {
+           {&world_from_camera_.translation, &view_.world_from_camera.translation,
+            &moving_view_.world_from_camera.translation, &moved_to_}) {
         *at = center + factor * (*at - center);
       }
     }

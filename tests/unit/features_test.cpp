@@ -155,7 +155,7 @@ TEST(PatchFrontEnd, ATrackThatEndedIsFoundAgainWhereItIsExpectedOrForgotten) {
     }
   }
   front_end->remove_outliers(is_good);
-  front_end->expect_projections(expected);
+  front_end->expect_projections(expected, false);
   const Matches second = show(2.0);
   std::size_t num_found = 0;
   for (std::size_t i = 0; i < n; i += 2) {
@@ -168,9 +168,37 @@ TEST(PatchFrontEnd, ATrackThatEndedIsFoundAgainWhereItIsExpectedOrForgotten) {
   EXPECT_TRUE(std::ranges::is_sorted(second.track_ids));
 
   front_end->remove_outliers(std::vector<char>(second.track_ids.size(), 1));
-  front_end->expect_projections(
-      {{first.track_ids[2], first.cur_uv[2] - Eigen::Vector2d(2.0, 0.0)}});
+  front_end->expect_projections({{first.track_ids[2], first.cur_uv[2] - Eigen::Vector2d(2.0, 0.0)}},
+                                false);
   EXPECT_FALSE(start_of(show(3.0), first.track_ids[2]).has_value());  // it was not there once
+}
+
+TEST(PatchFrontEnd, WhatMayBeHiddenIsLookedForUntilItIsSeenAgain) {
+  for (const bool may_hide : {false, true}) {
+    const auto front_end = create_front_end({});
+    cv::Mat image = textured_image({480, 200}, {0.0, 0.0});
+    static_cast<void>(front_end->process(image_of(image)));
+    const Matches before = front_end->process(image_of(image));
+    Observations expected;
+    for (std::size_t i = 0; i < before.track_ids.size(); ++i) {
+      if (before.cur_uv[i].x() < 220.0) {
+        expected.push_back({before.track_ids[i], before.cur_uv[i]});
+      }
+    }
+    ASSERT_GT(expected.size(), 20U);
+    cv::Mat hidden = image.clone();
+    hidden.colRange(0, 240).setTo(128);
+    for (const cv::Mat& seen : {hidden, hidden, hidden, image}) {
+      static_cast<void>(front_end->process(image_of(seen)));
+      front_end->expect_projections(expected, may_hide);
+    }
+    const Matches after = front_end->process(image_of(image));
+    const auto is_back = [&](const Observation& one) {
+      return std::ranges::find(after.track_ids, one.track_id) != after.track_ids.end();
+    };
+    const auto num_back = static_cast<std::size_t>(std::ranges::count_if(expected, is_back));
+    EXPECT_EQ(num_back, may_hide ? expected.size() : 0U);
+  }
 }
 
 TEST(PatchFrontEnd, WhatIsExpectedInTheDarkIsStillTrackedFromTheLastGoodImage) {
@@ -187,7 +215,7 @@ TEST(PatchFrontEnd, WhatIsExpectedInTheDarkIsStillTrackedFromTheLastGoodImage) {
   const cv::Mat dark(size, CV_8U, cv::Scalar(0));
   for (int i = 0; i < 3; ++i) {
     EXPECT_TRUE(show(dark).cur_uv.empty());
-    front_end->expect_projections(expected);
+    front_end->expect_projections(expected, false);
   }
   const Matches after = show(textured_image(size, {2.0, 0.0}));
   EXPECT_GT(after.track_ids.size(), before.track_ids.size() / 2);

@@ -98,13 +98,13 @@ TEST(StandingCamera, StandsByTheMedianFlowOfTwentyTracks) {
     before.push_back({i, uv});
     now.push_back({i, uv + Eigen::Vector2d(i < 10 ? 30.0 : 0.1, 0.0)});  // others pass by
   }
-  EXPECT_TRUE(is_stationary(before, now, 0.15, 20));
-  EXPECT_FALSE(is_stationary(before, now, 0.05, 20));
+  EXPECT_TRUE(stationary_flow_px(before, now, 0.15, 20).has_value());
+  EXPECT_FALSE(stationary_flow_px(before, now, 0.05, 20).has_value());
   now[10].uv.x() += 30.0;
-  EXPECT_FALSE(is_stationary(before, now, 0.15, 20));
+  EXPECT_FALSE(stationary_flow_px(before, now, 0.15, 20).has_value());
   now[10].uv.x() -= 30.0;
   now.resize(19);
-  EXPECT_FALSE(is_stationary(before, now, 0.15, 20));
+  EXPECT_FALSE(stationary_flow_px(before, now, 0.15, 20).has_value());
 }
 
 TEST(StandingCamera, StaysWhileOthersPassBy) {
@@ -115,7 +115,7 @@ TEST(StandingCamera, StaysWhileOthersPassBy) {
     before.push_back({i, uv});
     now.push_back({i, uv + Eigen::Vector2d(i < 30 ? 0.05 : 8.0, 0.0)});
   }
-  EXPECT_TRUE(is_stationary(before, now, 0.15, 20));
+  EXPECT_TRUE(stationary_flow_px(before, now, 0.15, 20).has_value());
 }
 
 /// A flock that goes right in a still world: ids 0 to 39 go, 100 to 139 stay.
