@@ -154,6 +154,8 @@ TEST(StemErrors, NamesAndPaths) {
   EXPECT_EQ(error_of("other"),
             "stem.model: expected default, paper, gray, input_layer, log, census or the path of an "
             ".onnx, found 'other'");
+  EXPECT_THAT(error_of("/dev/zero"), HasSubstr("path of an .onnx, found '/dev/zero'"));
+  EXPECT_THAT(error_of("/no/such.h5"), HasSubstr("path of an .onnx, found '/no/such.h5'"));
   EXPECT_THAT(error_of("/no/such.onnx"), HasSubstr("/no/such.onnx: cannot read: No such file"));
 }
 
