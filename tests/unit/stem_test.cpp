@@ -244,8 +244,7 @@ TEST(HandMade, OneChannelEachOfColourFramesToo) {
 }
 
 StemOptions options_of(const std::string& name, int filter = -1) {
-  StemOptions options{.model = tiny_model(name), .filter = filter};
-  return options;
+  return {.model = tiny_model(name), .filter = filter};
 }
 
 TEST(StemFolded, OneFilterAloneHasTheSameBytes) {
