@@ -12,14 +12,6 @@ class BadInput : public DriveCopy {
   }
 };
 
-TEST_F(BadInput, WhatIsNoModelIsNamed) {
-  for (const std::string& path : {std::string("/dev/zero"), (folder_ / "none.h5").string()}) {
-    const std::string found = "path of an .onnx, found '" + path;
-    expect_error(run({"--set", "stem.model=" + path}), 1, {"stem.model: expected default", found});
-    expect_error(run_stemvo({"models", path}), 1, {"stem.model: expected default", found});
-  }
-}
-
 /// Decoders print lines of their own, which name no file.
 TEST_F(BadInput, BrokenImagesAreOneWarningEach) {
   const fs::path images = sequence_ / "image_2";

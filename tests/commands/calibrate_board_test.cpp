@@ -5,7 +5,6 @@
 #include "support/program_test.hpp"
 #include "support/rendered_board.hpp"
 #include "support/test.hpp"
-#include "support/write_video.hpp"
 
 namespace stemvo {
 namespace {

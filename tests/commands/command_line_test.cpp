@@ -8,16 +8,6 @@ namespace {
 
 const Words kCommands = {"run", "evaluate", "channel", "synth", "calibrate", "check", "models"};
 
-TEST(CommandLine, HelpOfTheProgramNamesEveryCommand) {
-  const ProgramResult result = run_stemvo({"--help"});
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.err, IsEmpty());
-  for (const std::string& command : kCommands) {
-    EXPECT_THAT(result.out, HasSubstr("\n  " + command + " "));
-  }
-  EXPECT_THAT(result.out, HasSubstr("stemvo run drive/sequences/00 --out result"));
-}
-
 TEST(CommandLine, EveryCommandHasHelpAndVersion) {
   for (const std::string& command : kCommands) {
     const ProgramResult help = run_stemvo({command, "--help"});

@@ -14,7 +14,8 @@ using Json = nlohmann::json;
 
 /// The commands that the program's help lists.
 std::set<std::string> commands() {
-  const std::string help = run_stemvo({"--help"}).out;
+  const std::string help = succeeded(run_stemvo({"--help"})).out;
+  EXPECT_THAT(help, HasSubstr("stemvo run drive/sequences/00 --out result"));
   const std::size_t begin = std::min(help.find("\nSubcommands:"), help.size());
   const std::string list = help.substr(begin, help.find("\n\n", begin) - begin);
   std::set<std::string> names;

@@ -6,7 +6,6 @@
 #include "support/program_test.hpp"
 #include "support/shared_data.hpp"
 #include "support/test.hpp"
-#include "support/write_video.hpp"
 
 namespace stemvo {
 namespace {
@@ -22,12 +21,6 @@ class RecordingsRun : public DriveCopy {
   fs::path image(int index) const { return sequence_ / fmt::format("image_2/{:06}.png", index); }
   ProgramResult run(const std::string& input, const Words& more = {}) const {
     return run_stemvo({"run", input, "--out", out_}, more);
-  }
-  /// The poses of the same images in KITTI's layout.
-  std::string expected_poses() const {
-    const std::string out = folder_ / "kitti";
-    succeeded(run_stemvo({"run", sequence_.string(), "--out", out, "--set", "scale.source=none"}));
-    return read_file(out + "/trajectory_kitti.txt");
   }
   std::string poses() const { return read_file(out_ + "/trajectory_kitti.txt"); }
   nlohmann::json metrics() const {
@@ -109,12 +102,9 @@ TEST_F(RecordingsRun, AVideoShowsFramesTracksAndPath) {
   const std::string avi = write_video();
   const std::string before = read_file(avi);
   fs::resize_file(image(5), 100);
-  using Words = std::vector<std::string>;
   for (const auto& [input, name, more] : {std::tuple(sequence_.string(), "kitti.mp4", Words()),
                                           std::tuple(avi, "avi.mkv", Words{"--camera", camera_})}) {
-    Words words = {"--video", folder_ / name};
-    words.insert(words.end(), more.begin(), more.end());
-    const ProgramResult result = run(input, words);
+    const ProgramResult result = run(input, joined({"--video", folder_ / name}, more));
     ASSERT_EQ(result.exit_code, 0) << result.err;
     const auto video = dataset::open_decoder((folder_ / name).c_str(), 0, {}).value();
     ASSERT_TRUE(video);

@@ -26,60 +26,50 @@ def weights(filters, kernel):
 
 def gray_stem(name, stride, pick=None):
     """norm_k4s4's weights of the first colour on one gray plane; pick: that filter alone."""
-    constants = [numpy_helper.from_array(weights(6, 4)[:, :1], "weights"),
-                 numpy_helper.from_array(np.full((1, 1, 1, 1), 9.0, np.float32), "epsilon")]
-    nodes = [helper.make_node("Conv", ["image", "weights"], ["z"], kernel_shape=[4, 4], strides=[stride] * 2),
-             helper.make_node("ReduceSumSquare", ["z"], ["power"], axes=[1]),
-             helper.make_node("Add", ["power", "epsilon"], ["floored"]),
-             helper.make_node("Sqrt", ["floored"], ["length"])]
+    constants = {"weights": weights(6, 4)[:, :1], "epsilon": np.full((1, 1, 1, 1), 9.0, np.float32)}
     if pick is not None:
-        constants += [numpy_helper.from_array(np.array([number]), key)
-                      for key, number in (("from", pick), ("to", pick + 1), ("axis", 1))]
-        nodes += [helper.make_node("Slice", ["z", "from", "to", "axis"], ["own"])]
-    nodes += [helper.make_node("Div", ["z" if pick is None else "own", "length"], ["channels"])]
-    write(name, nodes, [value("image", [1, 1, "H", "W"])],
-          [value("channels", [1, 6 if pick is None else 1, "h", "w"])], constants,
-          metadata=said("stem", 6, 4, stride, [0] * 4, **({} if pick is None else {"filter": pick})))
+        constants |= {"from": np.array([pick]), "to": np.array([pick + 1]), "axis": np.array([1])}
+    write(name, f"""(float[1, 1, H, W] image) => (float[1, {6 if pick is None else 1}, h, w] channels) {{
+        z = Conv<kernel_shape = [4, 4], strides = [{stride}, {stride}]>(image, weights)
+        power = ReduceSumSquare<axes = [1]>(z)
+        floored = Add(power, epsilon)
+        length = Sqrt(floored)
+        {"" if pick is None else "own = Slice(z, from, to, axis)"}
+        channels = Div({"z" if pick is None else "own"}, length) }}""",
+          constants, said("stem", 6, 4, stride, [0] * 4, **({} if pick is None else {"filter": pick})))
 
 
-def stem(name, filters, kernel, stride, pads, layer_norm=False, size=("H", "W")):
-    constants = [numpy_helper.from_array(MEAN.reshape(1, 3, 1, 1), "mean"),
-                 numpy_helper.from_array(weights(filters, kernel), "weights")]
-    nodes = [helper.make_node("Sub", ["image", "mean"], ["centred"]),
-             helper.make_node("Conv", ["centred", "weights"], ["response" if layer_norm else "channels"],
-                              kernel_shape=[kernel] * 2, strides=[stride] * 2, pads=pads)]
+def stem(name, filters, kernel, stride, pads, layer_norm=False, size="H, W"):
+    constants = {"mean": MEAN.reshape(1, 3, 1, 1), "weights": weights(filters, kernel)}
     if layer_norm:
-        constants += [numpy_helper.from_array(np.full((1, 1, 1, 1), 1e-6, np.float32), "epsilon")]
-        nodes += [helper.make_node("ReduceMean", ["response"], ["m"], axes=[1]),
-                  helper.make_node("Sub", ["response", "m"], ["d"]),
-                  helper.make_node("Mul", ["d", "d"], ["d2"]),
-                  helper.make_node("ReduceMean", ["d2"], ["v"], axes=[1]),
-                  helper.make_node("Add", ["v", "epsilon"], ["ve"]),
-                  helper.make_node("Sqrt", ["ve"], ["s"]),
-                  helper.make_node("Div", ["d", "s"], ["channels"])]
-    write(name, nodes, [value("image", [1, 3, *size])], [value("channels", [1, filters, "h", "w"])], constants,
-          metadata=said("stem", filters, kernel, stride, pads))
+        constants["epsilon"] = np.full((1, 1, 1, 1), 1e-6, np.float32)
+    norm = """
+        m = ReduceMean<axes = [1]>(response)
+        d = Sub(response, m)
+        d2 = Mul(d, d)
+        v = ReduceMean<axes = [1]>(d2)
+        ve = Add(v, epsilon)
+        s = Sqrt(ve)
+        channels = Div(d, s)"""
+    write(name, f"""(float[1, 3, {size}] image) => (float[1, {filters}, h, w] channels) {{
+        centred = Sub(image, mean)
+        {"response" if layer_norm else "channels"} = Conv<kernel_shape = [{kernel}, {kernel}], pads = {pads}, strides = [{stride}, {stride}]>(centred, weights)
+        {norm if layer_norm else ""} }}""", constants, said("stem", filters, kernel, stride, pads))
 
 
 def deep(name):
     """A padded box of 3x3 over plain_k4s4, less its mean over the frame for the last filter."""
     box = np.zeros((2, 3, 3, 3), np.float32)
     box[0, 0] = box[1, 1] = 1.0 / 9.0
-    constants = [numpy_helper.from_array(MEAN.reshape(1, 3, 1, 1), "mean"),
-                 numpy_helper.from_array(weights(3, 4), "weights"), numpy_helper.from_array(box, "box"),
-                 numpy_helper.from_array(np.array([0.0, 1.0], np.float32).reshape(1, 2, 1, 1), "which")]
-    nodes = [helper.make_node("Sub", ["image", "mean"], ["centred"]),
-             helper.make_node("Conv", ["centred", "weights"], ["stem"], kernel_shape=[4, 4], strides=[4, 4]),
-             helper.make_node("Conv", ["stem", "box"], ["smooth"], kernel_shape=[3, 3], pads=[1, 1, 1, 1]),
-             helper.make_node("GlobalAveragePool", ["smooth"], ["average"]),
-             helper.make_node("Mul", ["average", "which"], ["level"]),
-             helper.make_node("Sub", ["smooth", "level"], ["channels"])]
-    write(name, nodes, [value("image", [1, 3, "H", "W"])], [value("channels", [1, 2, "h", "w"])], constants,
-          metadata=said("deep", 2, 12, 4, [4] * 4, sampling="native"))
-
-
-def value(name, shape, kind=TensorProto.FLOAT):
-    return helper.make_tensor_value_info(name, kind, shape)
+    write(name, """(float[1, 3, H, W] image) => (float[1, 2, h, w] channels) {
+        centred = Sub(image, mean)
+        stem = Conv<kernel_shape = [4, 4], strides = [4, 4]>(centred, weights)
+        smooth = Conv<kernel_shape = [3, 3], pads = [1, 1, 1, 1]>(stem, box)
+        average = GlobalAveragePool(smooth)
+        level = Mul(average, which)
+        channels = Sub(smooth, level) }""",
+          {"mean": MEAN.reshape(1, 3, 1, 1), "weights": weights(3, 4), "box": box, "which": np.array([0.0, 1.0], np.float32).reshape(1, 2, 1, 1)},
+          said("deep", 2, 12, 4, [4] * 4, sampling="native"))
 
 
 def said(layer, filters, kernel, stride, padding, **more):
@@ -89,30 +79,27 @@ def said(layer, filters, kernel, stride, padding, **more):
     return {f"stemvo.{key}": str(value) for key, value in values.items()}
 
 
-def write(name, nodes, inputs, outputs, constants=(), domains=(), is_checked=True, metadata=None):
-    graph = helper.make_graph(nodes, name, inputs, outputs, list(constants))
-    domains = [helper.make_opsetid("", 13)] + [helper.make_opsetid(domain, 1) for domain in domains]
-    model = helper.make_model(graph, opset_imports=domains, producer_name="stemvo tests")
-    model.ir_version = 7
+def write(name, graph, constants=None, metadata=None, domains='"": 13'):
+    """graph: in ONNX's textual form."""
+    model = onnx.parser.parse_model(f'<ir_version: 7, opset_import: [{domains}], producer_name: "stemvo tests"> {name} {graph}')
+    model.graph.initializer.extend(numpy_helper.from_array(values, key) for key, values in (constants or {}).items())
+    for node in model.graph.node:
+        node.domain or node.ClearField("domain")  # it writes empty ones
     helper.set_model_props(model, metadata or {})
-    if is_checked:
-        onnx.checker.check_model(model)
+    onnx.checker.check_model(model)
     (OUT / f"{name}.onnx").write_bytes(model.SerializeToString(deterministic=True))
-
-
-def identity(name, inputs, outputs):
-    """A model of the given shapes that copies its input, to be refused at load."""
-    write(name, [helper.make_node("Identity", [inputs[0].name], [outputs[0].name])], inputs, outputs)
+    return model
 
 
 def external(name):
     """Weights that the file beside it should hold."""
-    outside = numpy_helper.from_array(np.zeros((3, 3, 1, 1), np.float32), "weights")
+    model = write(name, "(float[1, 3, H, W] image) => (float[1, 3, h, w] channels) { channels = Conv<kernel_shape = [1, 1]>(image, weights) }",
+                  {"weights": np.zeros((3, 3, 1, 1), np.float32)})
+    outside, = model.graph.initializer
     outside.ClearField("raw_data")
     outside.data_location = TensorProto.EXTERNAL
     outside.external_data.add(key="location", value=f"{name}.bin")
-    write(name, [helper.make_node("Conv", ["image", "weights"], ["channels"], kernel_shape=[1, 1])],
-          [value("image", [1, 3, "H", "W"])], [value("channels", [1, 3, "h", "w"])], [outside], is_checked=False)
+    (OUT / f"{name}.onnx").write_bytes(model.SerializeToString(deterministic=True))
 
 
 def main():
@@ -123,34 +110,29 @@ def main():
     stem("plain_k3s2p1", 3, 3, 2, [1, 1, 1, 1])
     stem("plain_k3s2same", 3, 3, 2, [0, 0, 1, 1])
     stem("plain_k7s2p3", 3, 7, 2, [3, 3, 3, 3])
-    stem("fixed_k4s4", 3, 4, 4, none, size=(32, 48))
+    stem("fixed_k4s4", 3, 4, 4, none, size="32, 48")
 
     gray_stem("gray_k4s4", 4)
     gray_stem("gray_k4s4_filter_1", 2, pick=1)
     deep("deep_k12s4")
-    picture, shape = ["H", "W"], [1, 3, "H", "W"]
-    identity("wrong_input_name", [value("x", shape)], [value("channels", shape)])
-    write("wrong_two_outputs", [helper.make_node("Identity", ["image"], ["a"]), helper.make_node("Identity", ["image"], ["b"])],
-          [value("image", shape)], [value("a", shape), value("b", shape)])
-    identity("wrong_rank", [value("image", [3, *picture])], [value("channels", [3, *picture])])
-    identity("wrong_planes", [value("image", [1, 2, *picture])], [value("channels", [1, 2, *picture])])
-    identity("wrong_type", [value("image", shape, TensorProto.UINT8)], [value("channels", shape, TensorProto.UINT8)])
-    write("wrong_free_filters", [helper.make_node("ReduceMax", ["image"], ["brightest"]),
-                                 helper.make_node("Cast", ["brightest"], ["number"], to=TensorProto.INT64),
-                                 helper.make_node("Reshape", ["number", "one"], ["to"]),
-                                 helper.make_node("Slice", ["image", "from", "to", "axis"], ["channels"])],
-          [value("image", shape)], [value("channels", [1, "C", *picture])],
-          [numpy_helper.from_array(np.array([number]), key) for key, number in (("one", 1), ("from", 0), ("axis", 1))])
-    write("wrong_two_inputs", [helper.make_node("Add", ["image", "more"], ["channels"])],
-          [value("image", shape), value("more", shape)], [value("channels", shape)])
-    write("wrong_output_rank", [helper.make_node("ReduceMean", ["image"], ["channels"], axes=[1], keepdims=0)],
-          [value("image", shape)], [value("channels", [1, *picture])])
+    given, made = "(float[1, 3, H, W] image)", "(float[1, 3, H, W] channels)"
+    copied = "{ channels = Identity(image) }"
+    write("wrong_input_name", f"(float[1, 3, H, W] x) => {made} {{ channels = Identity(x) }}")
+    write("wrong_two_outputs", f"{given} => (float[1, 3, H, W] a, float[1, 3, H, W] b) {{ a = Identity(image) b = Identity(image) }}")
+    write("wrong_rank", f"(float[3, H, W] image) => (float[3, H, W] channels) {copied}")
+    write("wrong_planes", f"(float[1, 2, H, W] image) => (float[1, 2, H, W] channels) {copied}")
+    write("wrong_type", f"(uint8[1, 3, H, W] image) => (uint8[1, 3, H, W] channels) {copied}")
+    write("wrong_free_filters", f"""{given} => (float[1, C, H, W] channels) {{
+        brightest = ReduceMax(image)
+        number = Cast<to = 7>(brightest)
+        to = Reshape(number, one)
+        channels = Slice(image, from, to, axis) }}""", {key: np.array([number]) for key, number in (("one", 1), ("from", 0), ("axis", 1))})
+    write("wrong_two_inputs", f"(float[1, 3, H, W] image, float[1, 3, H, W] more) => {made} {{ channels = Add(image, more) }}")
+    write("wrong_output_rank", f"{given} => (float[1, H, W] channels) {{ channels = ReduceMean<axes = [1], keepdims = 0>(image) }}")
     external("wrong_external")
-    identity("wrong_no_metadata", [value("image", shape)], [value("channels", shape)])
-    write("wrong_domain", [helper.make_node("Steal", ["image"], ["channels"], domain="com.example")],
-          [value("image", shape)], [value("channels", shape)], domains=["com.example"])
-    write("wrong_infinite", [helper.make_node("Log", ["image"], ["channels"])], [value("image", shape)], [value("channels", shape)],
-          metadata=said("stem", 3, 1, 1, [0] * 4))
+    write("wrong_no_metadata", f"{given} => {made} {copied}")
+    write("wrong_domain", f"{given} => {made} {{ channels = com.example.Steal(image) }}", domains='"": 13, "com.example": 1')
+    write("wrong_infinite", f"{given} => {made} {{ channels = Log(image) }}", metadata=said("stem", 3, 1, 1, [0] * 4))
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import pytest
 from compare_test import evo_errors
 from evo.core import sync, trajectory
 from evo.tools import file_interface
+from scipy.spatial.transform import Rotation
 
 FRAMES = 40
 WORLD = np.array([[0.0, 0, 1, 5], [0, 1, 0, -2], [-1, 0, 0, 30]])  # of the truth by time: another one than the first camera's
@@ -28,9 +29,8 @@ def run(tmp_path_factory):
     timed = []
     for i, (pose, time) in enumerate(zip(np.loadtxt(folder / "drive/poses/00.txt").reshape(-1, 3, 4), np.loadtxt(folder / "drive/sequences/00/times.txt"))):
         turned, place = WORLD[:, :3] @ pose[:, :3], WORLD[:, :3] @ pose[:, 3] + WORLD[:, 3]
-        w = np.sqrt(1.0 + np.trace(turned)) / 2.0
         if i not in (0, 17):
-            timed.append([time + 0.003, *place, *(np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) / (4.0 * w)), w])
+            timed.append([time + 0.003, *place, *Rotation.from_matrix(turned).as_quat()])
     return folder, np.array(timed)
 
 

@@ -72,16 +72,12 @@ TEST_F(Calibrate, AStraightRoadTellsNothing) {
 }
 
 TEST_F(Calibrate, WhatIsWrongIsSaid) {
-  expect_error(calibrate({"--frames", "0:2", "--quiet"}), 1, {sequence_.string(), "2 frames"});
   expect_error(calibrate({"--calib", folder_ / "none.txt"}), 1, {"none.txt"});
   const std::string other = folder_ / "other.txt";
   write_camera(other, 1000.0, 2000.0, 100.0);
   expect_error(calibrate({"--calib", other}), 1, {"other.txt", "620x188", "2000"});
   expect_error(run_stemvo({"run", sequence_.string(), "--out", folder_ / "o", "--calib", other}), 1,
                {"other.txt", "620x188"});
-  fs::copy_file(sequence_ / "calib.txt", out_);
-  expect_error(calibrate({"--calib", out_}), 1, {out_, "no input"});
-  fs::remove(out_);
   expect_error(run_stemvo({"calibrate", folder_ / "none", "--out", out_}), 1, {folder_ / "none"});
   expect_error(run_stemvo({"calibrate", sequence_.string(), "--out", folder_.path().string()}), 1,
                {folder_.path().string(), "folder"});

@@ -56,7 +56,7 @@ try_python() {
     left_out=1
     return
   fi
-  cp "$SOURCE"/build/wheel/stemvo-*manylinux*.whl "$SOURCE/tests/package/make_recordings.py" "$HOME_DIR/"
+  cp "$SOURCE"/build/wheel/stemvo-*manylinux*.whl "$SOURCE/"{tests/package/make_recordings,tests/python/bags,python/stemvo/bag,python/stemvo/result_bag}.py "$HOME_DIR/"
   as_someone 'venv/bin/pip install --quiet "$(echo stemvo-*.whl)[bag,video]"'
   as_someone venv/bin/python make_recordings.py .
   pages python docs/python.md >"$HOME_DIR/pages.py"

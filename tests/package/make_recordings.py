@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: MIT
 """make_recordings.py FOLDER: of FOLDER/drive, a rendered one, the same frames as drive.avi (lossless) with camera.yaml, as folders in the layouts
-of EuRoC and TUM, and as a ROS bag."""
+of EuRoC and TUM, and as a ROS bag. Beside it: tests/python/bags.py,
+and of python/stemvo bag.py and result_bag.py."""
 
 import pathlib
 import shutil
 import sys
 
+import bags
 import cv2
-import numpy as np
-import rosbags.rosbag1
-from rosbags.typesys import Stores, get_typestore
 
 FIRST_NS, STEP_NS = 1_400_000_000_000_000_000, 100_000_000
 
@@ -38,29 +37,8 @@ def main():
     video.release()
     (euroc / "data.csv").write_text("#timestamp [ns],filename\n" + "".join(f"{time},{time}.png\n" for time in times))
     (tum / "rgb.txt").write_text("".join(f"{1e-9 * time:.6f} rgb/{time}.png\n" for time in times))
-    write_bag(folder / "drive.bag", images, times, intrinsics)
-
-
-def write_bag(file, images, times, intrinsics):
-    store = get_typestore(Stores.ROS1_NOETIC)
-    types = store.types
-    height, width = images[0].shape[:2]
-
-    def header(time):
-        return types["std_msgs/msg/Header"](seq=0, stamp=types["builtin_interfaces/msg/Time"](sec=time // 10**9, nanosec=time % 10**9), frame_id="camera")
-
     fx, fy, cx, cy = intrinsics
-    region = types["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
-    info = types["sensor_msgs/msg/CameraInfo"](
-        header=header(times[0]), height=height, width=width, distortion_model="plumb_bob", D=np.zeros(5), K=np.array([fx, 0, cx, 0, fy, cy, 0, 0, 1]),
-        R=np.eye(3).ravel(), P=np.zeros(12), binning_x=0, binning_y=0, roi=region)
-    with rosbags.rosbag1.Writer(file) as writer:
-        kinds = {"image_raw": "sensor_msgs/msg/Image", "camera_info": "sensor_msgs/msg/CameraInfo"}
-        topics = {name: writer.add_connection(f"/camera/{name}", kind, typestore=store) for name, kind in kinds.items()}
-        writer.write(topics["camera_info"], times[0], store.serialize_ros1(info, kinds["camera_info"]))
-        for image, time in zip(images, times):
-            message = types[kinds["image_raw"]](header=header(time), height=height, width=width, encoding="bgr8", is_bigendian=0, step=3 * width, data=image.ravel())
-            writer.write(topics["image_raw"], time, store.serialize_ros1(message, kinds["image_raw"]))
+    bags.write(folder / "drive.bag", "bag", [image[:, :, ::-1] for image in images], times, [fx, 0, cx, 0, fy, cy, 0, 0, 1], "bgr8")
 
 
 if __name__ == "__main__":

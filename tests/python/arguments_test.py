@@ -116,17 +116,3 @@ def test_a_mask_of_bool_is_one_of_bytes():
     assert len(tracked[0]) > 20 and tracked[0][:, 2].max() < 160
     for places in tracked:
         np.testing.assert_array_equal(places, tracked[0])
-
-
-def test_metres_by_speeds_name_their_source():
-    """Two planes that a camera goes past sideways, with the usual sigma of a wheel."""
-    odometry = stemvo.Odometry(PINHOLE)
-    wide = np.tile(GRAY, (1, 2))
-    assert odometry.scale_source == "none"
-    for k in range(30):
-        odometry.add_speed(0.1 * k, 2.0)
-        shown = np.concatenate([wide[:120, 4 * k:320 + 4 * k], wide[120:, 2 * k:320 + 2 * k]])
-        result = odometry.process(shown, 0.1 * k)
-    assert (result.scale_state, odometry.scale_source) == ("measured", "speed")
-    odometry.reset()
-    assert odometry.scale_source == "none"

@@ -135,6 +135,8 @@ assert abs(np.linalg.norm(ends[1] - ends[0]) / steps[-1] - 1.0) < 0.05, (ends, s
 assert wheels.scale_source == "speed" and metres.scale_source == "camera_height"
 raises(lambda: wheels.add_speed(0.5, 1.0, 0.1), "speed: expected")
 raises(lambda: wheels.add_distance(2.0, 1.0, 1.0, 0.1), "distance: expected a time after its beginning")
+wheels.reset()
+assert wheels.scale_source == "none"
 lines = []
 logger = logging.getLogger("stemvo")
 logger.setLevel(logging.INFO)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`stemvo run --stream` through a pipe, and recordings behind an address."""
 
+import functools
 import http.server
 import json
 import os
@@ -82,14 +83,7 @@ class TestAddress:
         video.parent.mkdir()
         subprocess.run([PROGRAM.parent / "tests/stemvo_write_video", video, "10", *self.images], check=True, capture_output=True)
 
-        class Quiet(http.server.SimpleHTTPRequestHandler):
-            def __init__(self, *arguments):
-                super().__init__(*arguments, directory=video.parent)
-
-            def log_message(self, *_):
-                pass
-
-        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Quiet)
+        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(http.server.SimpleHTTPRequestHandler, directory=video.parent))
         threading.Thread(target=server.serve_forever, daemon=True).start()
         self.address = f"http://user:secret@127.0.0.1:{server.server_port}"
         yield

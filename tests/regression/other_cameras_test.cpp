@@ -105,9 +105,7 @@ TEST_F(OtherCameras, DroneOfEuroc) {
   expect_poses({(data / "data").string(), "--camera", (data / "sensor.yaml").string()},
                num_images(data / "data"));
   // It hovers: nothing to make a map of, and nothing is lost.
-  for (const std::string& state : states()) {
-    EXPECT_THAT(state, ::testing::AnyOf("first", "stationary", "rotating"));
-  }
+  EXPECT_THAT(states(), ::testing::Each(::testing::AnyOf("first", "stationary", "rotating")));
 }
 
 TEST_F(OtherCameras, KinectOfTum) {

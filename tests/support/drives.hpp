@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <fcntl.h>
 #include <sys/file.h>
-#include <unistd.h>
 
 #include "support/run_program.hpp"
 #include "support/test.hpp"
@@ -19,21 +17,6 @@ struct DriveSize {
 };
 
 inline std::string image_name(int frame) { return fmt::format("image_2/{:06}.png", frame); }
-
-/// Holds a lock file while it lives.
-class FileLock {
- public:
-  explicit FileLock(const fs::path& file)
-      : descriptor_(::open(file.c_str(), O_CREAT | O_RDWR, 0600)) {
-    ::flock(descriptor_, LOCK_EX);
-  }
-  ~FileLock() { ::close(descriptor_); }
-  FileLock(const FileLock&) = delete;
-  FileLock& operator=(const FileLock&) = delete;
-
- private:
-  int descriptor_;
-};
 
 /// The folder for rendered drives, empty when the program is a new one. Hold its lock file.
 inline fs::path drives_folder() {
@@ -56,7 +39,9 @@ inline fs::path drives_folder() {
 inline fs::path render_once(const std::string& name, const Words& options) {
   const fs::path parent = fs::path(STEMVO_PROGRAM).parent_path() / "test_drives";
   fs::create_directories(parent);
-  const FileLock lock(parent / "lock");
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> lock(
+      std::fopen((parent / "lock").c_str(), "a"), &std::fclose);
+  ::flock(::fileno(lock.get()), LOCK_EX);
   const fs::path drive = drives_folder() / name;
   if (!fs::exists(drive)) {
     const fs::path unfinished = parent / (name + ".unfinished");

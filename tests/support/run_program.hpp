@@ -105,9 +105,12 @@ inline ProgramResult succeeded(ProgramResult result) {
   return result;
 }
 
-/// The stemvo program as a processor without AVX2 runs it.
-inline ProgramResult run_stemvo_portable(const Words& arguments) {
-  return run_program("/usr/bin/env", joined({"STEMVO_PORTABLE=1", STEMVO_PROGRAM}, arguments));
+/// Motion JPEG of images of one size.
+inline void write_video(const std::string& file,
+                        double rate_hz,
+                        const std::vector<std::filesystem::path>& images) {
+  succeeded(run_program(STEMVO_WRITE_VIDEO, joined({file, fmt::format("{}", rate_hz)},
+                                                   Words(images.begin(), images.end()))));
 }
 
 }  // namespace stemvo::test

@@ -38,9 +38,7 @@ struct StateRun {
 
   void expect_states(int from, int to, const Words& allowed) const {
     for (int i = from; i < to; ++i) {
-      const std::string& state = states.at(static_cast<std::size_t>(i));
-      EXPECT_TRUE(std::find(allowed.begin(), allowed.end(), state) != allowed.end())
-          << i << ": " << state;
+      EXPECT_THAT(allowed, Contains(states.at(static_cast<std::size_t>(i)))) << i;
     }
   }
 };

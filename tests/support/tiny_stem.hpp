@@ -66,51 +66,42 @@ inline cv::Mat textured_frame(cv::Size size, int type) {
   return frame;
 }
 
-/// The layer in plain loops and doubles at any stride; zeros outside the frame (after the mean was
+/// The layer in doubles at any stride; zeros outside the frame (after the mean was
 /// taken off). One image per filter.
 inline std::vector<cv::Mat1d> reference_channels(const TinyStem& stem,
                                                  const cv::Mat& frame,
                                                  int stride) {
-  const std::array<double, 3> mean = {120.0, 115.0, 110.0};
   const auto [top, left, bottom, right] = stem.padding;
-  const cv::Size size((frame.cols + left + right - stem.kernel) / stride + 1,
-                      (frame.rows + top + bottom - stem.kernel) / stride + 1);
-  std::vector<cv::Mat1d> channels;
-  for (int o = 0; o < stem.filters; ++o) {
-    channels.emplace_back(size, 0.0);
+  cv::Mat centred = frame;
+  if (frame.channels() == 1) {
+    cv::cvtColor(frame, centred, cv::COLOR_GRAY2RGB);
   }
-  const auto pixel = [&](int c, int y, int x) {
-    const bool inside = y >= 0 && x >= 0 && y < frame.rows && x < frame.cols;
-    const int plane = frame.channels() == 3 ? c : 0;
-    return inside ? frame.ptr<unsigned char>(y)[x * frame.channels() + plane] -
-                        mean.at(static_cast<std::size_t>(c))
-                  : 0.0;
-  };
-  for (int row = 0; row < size.height; ++row) {
-    for (int col = 0; col < size.width; ++col) {
-      for (int o = 0; o < stem.filters; ++o) {
-        double& sum = channels[static_cast<std::size_t>(o)](row, col);
-        for (int i = 0; i < 3 * stem.kernel * stem.kernel; ++i) {
-          const int c = i / (stem.kernel * stem.kernel);
-          const int y = i / stem.kernel % stem.kernel;
-          const int x = i % stem.kernel;
-          sum +=
-              stem.weight(o, c, y, x) * pixel(c, row * stride - top + y, col * stride - left + x);
-        }
-      }
-      if (stem.layer_norm) {
-        double m = 0.0;
-        double v = 0.0;
-        for (const cv::Mat1d& channel : channels) {
-          m += channel(row, col) / stem.filters;
-        }
-        for (const cv::Mat1d& channel : channels) {
-          v += std::pow(channel(row, col) - m, 2) / stem.filters;
-        }
-        for (cv::Mat1d& channel : channels) {
-          channel(row, col) = (channel(row, col) - m) / std::sqrt(v + 1e-6);
-        }
-      }
+  centred.convertTo(centred, CV_64F);
+  cv::subtract(centred, cv::Scalar(120.0, 115.0, 110.0), centred);
+  cv::copyMakeBorder(centred, centred, top, bottom, left, right, cv::BORDER_CONSTANT);
+  std::vector<cv::Mat1d> channels;
+  cv::Mat1d mean = cv::Mat1d::zeros((centred.rows - stem.kernel) / stride + 1,
+                                    (centred.cols - stem.kernel) / stride + 1);
+  for (int o = 0; o < stem.filters; ++o) {
+    cv::Mat3d weights(stem.kernel, stem.kernel);
+    weights.forEach([&](cv::Vec3d& w, const int* at) {
+      w = {stem.weight(o, 0, at[0], at[1]), stem.weight(o, 1, at[0], at[1]),
+           stem.weight(o, 2, at[0], at[1])};
+    });
+    channels.emplace_back(mean.size()).forEach([&](double& value, const int* at) {
+      value = weights.dot(centred({{stride * at[1], stride * at[0]}, weights.size()}));
+    });
+    mean += channels.back() / stem.filters;
+  }
+  if (stem.layer_norm) {
+    cv::Mat1d variance(mean.size(), 1e-6);
+    for (cv::Mat1d& channel : channels) {
+      channel -= mean;
+      variance += channel.mul(channel) / stem.filters;
+    }
+    cv::sqrt(variance, variance);
+    for (cv::Mat1d& channel : channels) {
+      channel /= variance;
     }
   }
   return channels;

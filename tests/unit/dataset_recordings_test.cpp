@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/frame_files.hpp"
 #include "dataset/frame_source.hpp"
+#include "support/run_program.hpp"
 #include "support/test.hpp"
-#include "support/write_video.hpp"
 
 namespace stemvo {
 namespace {

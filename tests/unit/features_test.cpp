@@ -55,20 +55,6 @@ TEST_P(FrontEndTest, ABlankOrResizedImageStartsOver) {
   EXPECT_TRUE(front_end_->process(image_of(textured_image({200, 100}, {0.0, 0.0}))).cur_uv.empty());
 }
 
-/// Blobs all over, seen through a channel of half the input's size.
-ChannelImage textured(int shift_px) {
-  cv::Mat noise(200, 300, CV_8UC1);
-  cv::RNG rng(5);
-  rng.fill(noise, cv::RNG::UNIFORM, 0, 256);
-  cv::GaussianBlur(noise, noise, {}, 2.0);
-  cv::normalize(noise, noise, 0, 255, cv::NORM_MINMAX);
-  ChannelImage image;
-  image.pixels = noise(cv::Rect(20 + shift_px, 20, 240, 150)).clone();
-  image.map.scale = Eigen::Vector2d(2.0, 2.0);
-  image.map.offset_px = Eigen::Vector2d(0.5, 0.5);
-  return image;
-}
-
 TEST_P(FrontEndTest, APartOfOneImageEndsTheTracksThereAndBeginsNone) {
   cv::Mat all_but_left(300, 480, CV_8UC1, cv::Scalar(1));
   all_but_left.colRange(0, 100) = 0;
@@ -79,8 +65,9 @@ TEST_P(FrontEndTest, APartOfOneImageEndsTheTracksThereAndBeginsNone) {
     return std::ranges::count_if(points, [](const Eigen::Vector2d& uv) { return uv.y() >= 202.0; });
   };
   const auto show = [&](int i, const cv::Mat& mask) {
+    const cv::Mat image = textured_image({240, 150}, {1.0 * i, 0.0});
     const Matches matches =
-        front_end_->process(front_end_->prepare(textured(i), mask), {.frame = i});
+        front_end_->process(front_end_->prepare(image_of(image, 2.0, 0.5), mask), {.frame = i});
     EXPECT_TRUE(std::ranges::all_of(matches.cur_uv, [](const Eigen::Vector2d& uv) {
       return uv.x() > 96.0;
     })) << i;

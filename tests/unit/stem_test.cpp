@@ -154,6 +154,8 @@ TEST(StemErrors, NamesAndPaths) {
   EXPECT_EQ(error_of("other"),
             "stem.model: expected default, paper, gray, input_layer, log, census or the path of an "
             ".onnx, found 'other'");
+  EXPECT_THAT(error_of("/dev/zero"), HasSubstr("path of an .onnx, found '/dev/zero'"));
+  EXPECT_THAT(error_of("/no/such.h5"), HasSubstr("path of an .onnx, found '/no/such.h5'"));
   EXPECT_THAT(error_of("/no/such.onnx"), HasSubstr("/no/such.onnx: cannot read: No such file"));
 }
 
@@ -242,8 +244,7 @@ TEST(HandMade, OneChannelEachOfColourFramesToo) {
 }
 
 StemOptions options_of(const std::string& name, int filter = -1) {
-  StemOptions options{.model = tiny_model(name), .filter = filter};
-  return options;
+  return {.model = tiny_model(name), .filter = filter};
 }
 
 TEST(StemFolded, OneFilterAloneHasTheSameBytes) {
@@ -269,13 +270,9 @@ double gray_response(const cv::Mat1d& gray, cv::Point at, int filter) {
   double power = 9.0;
   double own = 0.0;
   for (int o = 0; o < 6; ++o) {
-    double z = 0.0;
-    for (int y = 0; y < 4; ++y) {
-      for (int x = 0; x < 4; ++x) {
-        const double weight = o == 0 ? 1.0 / 48.0 : kNorm4.weight(o, 0, y, x);
-        z += weight * gray(2 * at.y + y, 2 * at.x + x);
-      }
-    }
+    cv::Mat1d weights(4, 4);
+    weights.forEach([&](double& w, const int* yx) { w = kNorm4.weight(o, 0, yx[0], yx[1]); });
+    const double z = weights.dot(gray({2 * at, weights.size()}));
     power += z * z;
     own = o == filter ? z : own;
   }
@@ -286,10 +283,8 @@ TEST(StemFolded, AGrayGraphSeesTheUnroundedGrayOfAColourFrame) {
   const cv::Mat frame = textured_frame({97, 66}, CV_8UC3);
   cv::Mat3d colours;
   frame.convertTo(colours, CV_64F);
-  cv::Mat1d gray(frame.size());
-  std::transform(colours.begin(), colours.end(), gray.begin(), [](const cv::Vec3d& rgb) {
-    return 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2];
-  });
+  cv::Mat1d gray;
+  cv::transform(colours, gray, cv::Matx13d(0.299, 0.587, 0.114));
   for (const int filter : {0, 1, 5}) {  // 1 has a file of its own
     const auto stem =
         Stem::load(options_of(filter == 1 ? "gray_k4s4_filter_1" : "gray_k4s4", filter));

@@ -14,8 +14,7 @@ class SyntheticDriveTest : public ::testing::Test {
  protected:
   void TearDown() override { cv::setNumThreads(-1); }
   static SyntheticDriveOptions small(int num_frames) {
-    SyntheticDriveOptions options{.num_frames = num_frames, .width_px = 160, .height_px = 48};
-    return options;
+    return {.num_frames = num_frames, .width_px = 160, .height_px = 48};
   }
   fs::path write_poses(const Trajectory& poses) const {
     const fs::path file = root_ / "given.txt";

@@ -96,6 +96,17 @@ double difference(const cv::Mat& a, const cv::Mat& b, const cv::Rect& where) {
   return cv::norm(a(where), b(where), cv::NORM_L2);
 }
 
+/// The length for which two images differ least, and by how much they do.
+template <typename Difference>
+std::pair<double, double> least_of(double first, double end, double step, const Difference& of) {
+  std::pair<double, double> best(first, of(first));
+  for (double at = first + step; at < end; at += step) {
+    const double now = of(at);
+    best = now < best.second ? std::pair(at, now) : best;
+  }
+  return best;
+}
+
 /// Near the image's middle a turn moves everything by f times the angle.
 TEST(Shutter, BlursByExposureTimesFlow) {
   constexpr double kExposure_s = 0.03;
@@ -104,15 +115,9 @@ TEST(Shutter, BlursByExposureTimesFlow) {
   const cv::Mat sharp = render({.walk_rate_hz = kRate_hz});
   const cv::Mat blurred = render({.walk_rate_hz = kRate_hz, .exposure_s = kExposure_s});
   const cv::Rect middle(110, 80, 100, 80);
-  double best_px = 0.0;
-  double least = 1e12;
-  for (double length_px = 0.0; length_px < 2.0 * expected_px; length_px += 0.25) {
-    const double now = difference(smeared(sharp, length_px), blurred, middle);
-    if (now < least) {
-      least = now;
-      best_px = length_px;
-    }
-  }
+  const auto [best_px, least] = least_of(0.0, 2.0 * expected_px, 0.25, [&](double length_px) {
+    return difference(smeared(sharp, length_px), blurred, middle);
+  });
   EXPECT_NEAR(best_px, expected_px, 0.08 * expected_px);
   EXPECT_LT(least, 0.25 * difference(sharp, blurred, middle));
 }
@@ -126,18 +131,12 @@ TEST(Shutter, ShearsByReadoutTimesFlow) {
     const double delay_s = kReadout_s * ((row + 0.5) / 240.0 - 0.5);
     const double expected_px = -292.5 * kTurn_rad_s * delay_s;
     const cv::Rect band(130, row - 6, 60, 13);
-    double best_px = 0.0;
-    double least = 1e12;
-    for (double shift_px = -8.0; shift_px <= 8.0; shift_px += 0.1) {
-      cv::Mat moved;
-      const cv::Matx23d by(1.0, 0.0, shift_px, 0.0, 1.0, 0.0);
-      cv::warpAffine(at_once, moved, by, at_once.size(), cv::INTER_CUBIC);
-      const double now = difference(moved, by_rows, band);
-      if (now < least) {
-        least = now;
-        best_px = shift_px;
-      }
-    }
+    const double best_px = least_of(-8.0, 8.05, 0.1, [&](double shift_px) {
+                             cv::Mat moved;
+                             const cv::Matx23d by(1.0, 0.0, shift_px, 0.0, 1.0, 0.0);
+                             cv::warpAffine(at_once, moved, by, at_once.size(), cv::INTER_CUBIC);
+                             return difference(moved, by_rows, band);
+                           }).first;
     EXPECT_NEAR(best_px, expected_px, 0.35) << "row " << row;
   }
 }

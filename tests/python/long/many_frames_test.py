@@ -4,10 +4,7 @@ is kept of a frame: pose, row and landmarks. Without loops: what remembers a pla
 keyframe still, and so does its graph."""
 
 import os
-import pathlib
 import subprocess
-import tempfile
-import unittest
 
 from drives import watched_run
 
@@ -23,34 +20,22 @@ def frame(i):
     return RENDERED - 1 - abs(i % (2 * RENDERED - 2) - (RENDERED - 1))
 
 
-class ManyFrames(unittest.TestCase):
-    def test_nothing_grows(self):
-        with tempfile.TemporaryDirectory() as name:
-            folder = pathlib.Path(name)
-            subprocess.run([PROGRAM, "synth", folder / "drive", "--frames", str(RENDERED), "--width", "310", "--height", "94"],
-                           check=True, capture_output=True)
-            rendered = folder / "drive/sequences/00"
-            sequence = folder / "long/sequences/00"
-            (sequence / "image_2").mkdir(parents=True)
-            os.link(rendered / "calib.txt", sequence / "calib.txt")
-            (sequence / "times.txt").write_text("".join(f"{0.1 * i:.1f}\n" for i in range(FRAMES)))
-            for i in range(FRAMES):
-                os.symlink(rendered / f"image_2/{frame(i):06d}.png", sequence / f"image_2/{i:06d}.png")
-            result = watched_run.run(PROGRAM, sequence, folder / "out", FRAMES, ["--set", "odometry.loops=off"])
-            rows = (folder / "out/trajectory_kitti.txt").read_text().count("\n")
-        # Samples of the second quarter and of the second half are 3/8 of the frames apart.
-        grown_kb = 1024 * (result.median_mb[1] - result.median_mb[0]) / (0.375 * FRAMES)
-        print(f"memory {result.memory_mb} MB, {grown_kb:.1f} kB a frame, open files {result.handles}, "
-              f"processor ms per frame {result.quarters_cpu_ms}")
-        self.assertEqual(rows, FRAMES)
-        self.assertEqual(result.metrics["frames"], FRAMES)
-        self.assertLess(grown_kb, MAX_KB_PER_FRAME)
-        self.assertGreater(result.handles[0], 3)
-        # A leak of one a frame would be thousands; a file that is open for a moment is seen by one sample and missed
-        # by the next.
-        self.assertLessEqual(result.handles[1], result.handles[0] + MAX_FILES_FOR_A_MOMENT)
-        self.assertLess(result.quarters_cpu_ms[3], 1.3 * min(result.quarters_cpu_ms[:3]))
-
-
-if __name__ == "__main__":
-    unittest.main()
+def test_nothing_grows(tmp_path):
+    subprocess.run([PROGRAM, "synth", tmp_path / "drive", "--frames", str(RENDERED), "--width", "310", "--height", "94"], check=True, capture_output=True)
+    rendered, sequence = tmp_path / "drive/sequences/00", tmp_path / "long/sequences/00"
+    (sequence / "image_2").mkdir(parents=True)
+    os.link(rendered / "calib.txt", sequence / "calib.txt")
+    (sequence / "times.txt").write_text("".join(f"{0.1 * i:.1f}\n" for i in range(FRAMES)))
+    for i in range(FRAMES):
+        os.symlink(rendered / f"image_2/{frame(i):06d}.png", sequence / f"image_2/{i:06d}.png")
+    result = watched_run.run(PROGRAM, sequence, tmp_path / "out", FRAMES, ["--set", "odometry.loops=off"])
+    # Samples of the second quarter and of the second half are 3/8 of the frames apart.
+    grown_kb = 1024 * (result.median_mb[1] - result.median_mb[0]) / (0.375 * FRAMES)
+    print(f"memory {result.memory_mb} MB, {grown_kb:.1f} kB a frame, open files {result.handles}, "
+          f"processor ms per frame {result.quarters_cpu_ms}")
+    assert (tmp_path / "out/trajectory_kitti.txt").read_text().count("\n") == result.metrics["frames"] == FRAMES
+    assert grown_kb < MAX_KB_PER_FRAME
+    # A leak of one a frame would be thousands; a file that is open for a moment is seen by one sample and missed
+    # by the next.
+    assert 3 < result.handles[0] and result.handles[1] <= result.handles[0] + MAX_FILES_FOR_A_MOMENT
+    assert result.quarters_cpu_ms[3] < 1.3 * min(result.quarters_cpu_ms[:3])
