@@ -56,7 +56,7 @@ Expected<Metrics> compare(const PosesArgument& estimate,
   if (poses->size() < 2) {
     return fail(fmt::format("estimate: expected at least 2 poses, found {}", poses->size()));
   }
-  return evaluate_aligned(*poses, *true_poses, alignment);
+  return evaluate_aligned({*poses, *true_poses}, alignment);
 }
 
 nb::dict evaluate_poses(const PosesArgument& estimate,
@@ -114,7 +114,7 @@ TrajectoryPair pair_of(const GivenArray& estimate, const GivenArray& truth) {
 
 DoubleArray with_true_steps(const GivenArray& estimate, const GivenArray& truth) {
   const TrajectoryPair pair = pair_of(estimate, truth);
-  return array_of(rescale_steps(pair.estimate, pair.truth));
+  return array_of(rescale_steps({pair.estimate, pair.truth}));
 }
 
 nb::dict errors_by_segment(const GivenArray& estimate,
@@ -131,8 +131,8 @@ nb::dict errors_by_segment(const GivenArray& estimate,
   const auto errors = [&] {
     const nb::gil_scoped_release release;
     return segment_errors(
-        pair.estimate, pair.truth,
-        lengths_m ? *lengths_m : evaluate(pair.estimate, pair.truth).segment_lengths_m, every);
+        {pair.estimate, pair.truth},
+        lengths_m ? *lengths_m : evaluate({pair.estimate, pair.truth}).segment_lengths_m, every);
   }();
   const auto column = [&](auto member) {
     std::vector<std::remove_cvref_t<decltype(errors.front().*member)>> values;
@@ -156,7 +156,7 @@ nb::dict dense_errors_of(const GivenArray& estimate,
   const TrajectoryPair pair = pair_of(estimate, truth);
   const DenseErrors errors = [&] {
     const nb::gil_scoped_release release;
-    return dense_errors(pair.estimate, pair.truth, max_segments);
+    return dense_errors({pair.estimate, pair.truth}, max_segments);
   }();
   nb::dict result;
   result["t_percent"] = array_of(errors.t_percent);

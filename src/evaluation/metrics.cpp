@@ -17,11 +17,8 @@ constexpr double kDevkitLengths_m[] = {100, 200, 300, 400, 500, 600, 700, 800};
 constexpr double kShortLengths_m[] = {10, 20, 30, 40, 50};
 
 std::vector<Eigen::Vector3d> positions(std::span<const Rigid3> poses) {
-  std::vector<Eigen::Vector3d> result;
-  result.reserve(poses.size());
-  for (const Rigid3& pose : poses) {
-    result.push_back(pose.translation);
-  }
+  std::vector<Eigen::Vector3d> result(poses.size());
+  std::ranges::transform(poses, result.begin(), &Rigid3::translation);
   return result;
 }
 
@@ -34,20 +31,15 @@ std::vector<double> distances_m(std::span<const Rigid3> poses) {
 }
 
 Trajectory transform(const Similarity3& by, std::span<const Rigid3> poses) {
-  Trajectory result;
-  result.reserve(poses.size());
-  for (const Rigid3& pose : poses) {
-    result.push_back(by * pose);
-  }
+  Trajectory result(poses.size());
+  std::ranges::transform(poses, result.begin(), [&](const Rigid3& pose) { return by * pose; });
   return result;
 }
 
 /// Both start at the identity. Umeyama's fit on positions.
-Trajectory align(std::span<const Rigid3> estimate,
-                 std::span<const Rigid3> ground_truth,
-                 Alignment alignment) {
-  return transform(align_positions(positions(estimate), positions(ground_truth), alignment),
-                   estimate);
+Trajectory align(const PosePairs& pairs, Alignment alignment) {
+  return transform(align_positions(positions(pairs.estimate), positions(pairs.truth), alignment),
+                   pairs.estimate);
 }
 
 double rmse_m(std::span<const Eigen::Vector3d> estimate, std::span<const Eigen::Vector3d> truth) {
@@ -58,41 +50,46 @@ double rmse_m(std::span<const Eigen::Vector3d> estimate, std::span<const Eigen::
   return std::sqrt(sum / static_cast<double>(estimate.size()));
 }
 
-AbsoluteTrajectoryError ate_rmse(std::span<const Rigid3> estimate,
-                                 std::span<const Rigid3> ground_truth) {
-  const std::vector<Eigen::Vector3d> truth = positions(ground_truth);
+AbsoluteTrajectoryError ate_rmse(const PosePairs& pairs) {
+  const std::vector<Eigen::Vector3d> truth = positions(pairs.truth);
   const auto after_m = [&](Alignment alignment) {
-    return rmse_m(positions(align(estimate, ground_truth, alignment)), truth);
+    return rmse_m(positions(align(pairs, alignment)), truth);
   };
-  return {rmse_m(positions(estimate), truth), after_m(Alignment::kScale), after_m(Alignment::kSe3),
-          after_m(Alignment::kSim3)};
+  return {rmse_m(positions(pairs.estimate), truth), after_m(Alignment::kScale),
+          after_m(Alignment::kSe3), after_m(Alignment::kSim3)};
+}
+
+/// The paper's offset, (E_x + E_y) / N_f: mean of |dx| + |dz| between the poses as they are
+/// (KITTI's ground plane is x-z).
+double average_offset_m(const PosePairs& pairs) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Eigen::Vector3d offset = pairs.estimate[i].translation - pairs.truth[i].translation;
+    sum += std::abs(offset.x()) + std::abs(offset.z());
+  }
+  return sum / static_cast<double>(pairs.size());
 }
 
 /// The rest of the true motion first -> last after undoing the estimated one (devkit).
-Rigid3 motion_error(std::span<const Rigid3> estimate,
-                    std::span<const Rigid3> ground_truth,
-                    std::size_t first,
-                    std::size_t last) {
-  const Rigid3 estimated = estimate[first].inverse() * estimate[last];
-  const Rigid3 truth = ground_truth[first].inverse() * ground_truth[last];
+Rigid3 motion_error(const PosePairs& pairs, std::size_t first, std::size_t last) {
+  const Rigid3 estimated = pairs.estimate[first].inverse() * pairs.estimate[last];
+  const Rigid3 truth = pairs.truth[first].inverse() * pairs.truth[last];
   return estimated.inverse() * truth;
 }
 
-void add_step_errors(std::span<const Rigid3> estimate,
-                     std::span<const Rigid3> ground_truth,
-                     Metrics& metrics) {
-  if (estimate.size() < 2) {
+void add_step_errors(const PosePairs& pairs, Metrics& metrics) {
+  if (pairs.size() < 2) {
     return;
   }
   double sum_m = 0.0;
   double sum_rad = 0.0;
-  for (std::size_t i = 1; i < estimate.size(); ++i) {
-    const Rigid3 error = motion_error(estimate, ground_truth, i - 1, i);
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    const Rigid3 error = motion_error(pairs, i - 1, i);
     sum_m += error.translation.norm();
     sum_rad += error.angle_rad();
   }
-  metrics.rpe_translation_m = sum_m / static_cast<double>(estimate.size() - 1);
-  metrics.rpe_rotation_deg = kDegPerRad * sum_rad / static_cast<double>(estimate.size() - 1);
+  metrics.rpe_translation_m = sum_m / static_cast<double>(pairs.size() - 1);
+  metrics.rpe_rotation_deg = kDegPerRad * sum_rad / static_cast<double>(pairs.size() - 1);
 }
 
 /// First frame more than `length_m` behind `first`; the number of frames when there is none.
@@ -103,12 +100,9 @@ std::size_t segment_end(std::span<const double> distances, std::size_t first, do
 }
 
 /// t_rel and r_rel: mean over all segments of all lengths, each divided by its nominal length.
-void add_segment_errors(std::span<const Rigid3> estimate,
-                        std::span<const Rigid3> ground_truth,
-                        std::size_t first_frame_step,
-                        Metrics& metrics) {
+void add_segment_errors(const PosePairs& pairs, Metrics& metrics) {
   const std::vector<SegmentError> segments =
-      segment_errors(estimate, ground_truth, metrics.segment_lengths_m, first_frame_step);
+      segment_errors(pairs, metrics.segment_lengths_m, kFirstFrameStep);
   metrics.num_segments = static_cast<int>(segments.size());
   if (segments.empty()) {
     return;
@@ -137,20 +131,18 @@ std::vector<double> segment_lengths(const EvaluationOptions& options, double pat
 
 double length_of_path(std::span<const Rigid3> poses) { return distances_m(poses).back(); }
 
-std::vector<SegmentError> segment_errors(std::span<const Rigid3> estimate,
-                                         std::span<const Rigid3> ground_truth,
+std::vector<SegmentError> segment_errors(const PosePairs& pairs,
                                          std::span<const double> lengths_m,
                                          std::size_t first_frame_step) {
-  STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
-  const std::vector<double> distances = distances_m(ground_truth);
+  const std::vector<double> distances = distances_m(pairs.truth);
   std::vector<SegmentError> errors;
-  for (std::size_t first = 0; first < ground_truth.size(); first += first_frame_step) {
+  for (std::size_t first = 0; first < pairs.size(); first += first_frame_step) {
     for (const double length_m : lengths_m) {
       const std::size_t last = segment_end(distances, first, length_m);
       if (last == distances.size()) {
         continue;
       }
-      const Rigid3 error = motion_error(estimate, ground_truth, first, last);
+      const Rigid3 error = motion_error(pairs, first, last);
       errors.push_back({first, last, length_m, 100.0 * error.translation.norm() / length_m,
                         100.0 * kDegPerRad * error.angle_rad() / length_m});
     }
@@ -158,44 +150,29 @@ std::vector<SegmentError> segment_errors(std::span<const Rigid3> estimate,
   return errors;
 }
 
-double average_offset_m(std::span<const Rigid3> estimate, std::span<const Rigid3> ground_truth) {
-  STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
-  STEMVO_CHECK(!estimate.empty(), "at least one pose");
-  double sum = 0.0;
-  for (std::size_t i = 0; i < estimate.size(); ++i) {
-    const Eigen::Vector3d offset = estimate[i].translation - ground_truth[i].translation;
-    sum += std::abs(offset.x()) + std::abs(offset.z());
-  }
-  return sum / static_cast<double>(estimate.size());
-}
-
-Metrics evaluate(std::span<const Rigid3> estimate,
-                 std::span<const Rigid3> ground_truth,
-                 const EvaluationOptions& options) {
-  STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
-  STEMVO_CHECK(!estimate.empty(), "at least one pose");
-  const Trajectory est = relative_to_first(estimate);
-  const Trajectory truth = relative_to_first(ground_truth);
+Metrics evaluate(const PosePairs& given, const EvaluationOptions& options) {
+  STEMVO_CHECK(given.size() > 0, "at least one pose");
+  const Trajectory estimate = relative_to_first(given.estimate);
+  const Trajectory truth = relative_to_first(given.truth);
+  const PosePairs pairs(estimate, truth);
 
   Metrics metrics;
   metrics.path_length_m = length_of_path(truth);
-  metrics.average_offset_m = average_offset_m(est, truth);
-  metrics.null_offset_m = average_offset_m(Trajectory(truth.size()), truth);
+  metrics.average_offset_m = average_offset_m(pairs);
+  metrics.null_offset_m = average_offset_m({Trajectory(truth.size()), truth});
   metrics.segment_lengths_m = segment_lengths(options, metrics.path_length_m);
-  add_segment_errors(est, truth, kFirstFrameStep, metrics);
-  metrics.ate_rmse = ate_rmse(est, truth);
-  add_step_errors(est, truth, metrics);
+  add_segment_errors(pairs, metrics);
+  metrics.ate_rmse = ate_rmse(pairs);
+  add_step_errors(pairs, metrics);
   return metrics;
 }
 
-DenseErrors dense_errors(std::span<const Rigid3> estimate,
-                         std::span<const Rigid3> ground_truth,
-                         std::size_t max_segments) {
-  STEMVO_CHECK(!estimate.empty(), "at least one pose");
-  const double length_m = kDenseShare * length_of_path(ground_truth);
-  const std::size_t step = (estimate.size() - 1) / max_segments + 1;
+DenseErrors dense_errors(const PosePairs& pairs, std::size_t max_segments) {
+  STEMVO_CHECK(pairs.size() > 0, "at least one pose");
+  const double length_m = kDenseShare * length_of_path(pairs.truth);
+  const std::size_t step = (pairs.size() - 1) / max_segments + 1;
   DenseErrors errors;
-  for (const SegmentError& one : segment_errors(estimate, ground_truth, {&length_m, 1}, step)) {
+  for (const SegmentError& one : segment_errors(pairs, {&length_m, 1}, step)) {
     errors.t_percent.push_back(one.t_percent);
     errors.r_deg_per_100m.push_back(one.r_deg_per_100m);
     errors.block = std::max(errors.block, (one.last - one.first + step - 1) / step);
@@ -203,20 +180,19 @@ DenseErrors dense_errors(std::span<const Rigid3> estimate,
   return errors;
 }
 
-Metrics evaluate_aligned(std::span<const Rigid3> estimate,
-                         std::span<const Rigid3> ground_truth,
+Metrics evaluate_aligned(const PosePairs& pairs,
                          Alignment alignment,
                          const EvaluationOptions& options) {
-  const Metrics as_it_comes = evaluate(estimate, ground_truth, options);
+  const Metrics as_it_comes = evaluate(pairs, options);
   if (alignment == Alignment::kNone) {
     return as_it_comes;
   }
-  const Trajectory aligned =
-      align(relative_to_first(estimate), relative_to_first(ground_truth), alignment);
-  Metrics metrics = evaluate(aligned, ground_truth, options);
+  const Trajectory truth = relative_to_first(pairs.truth);
+  const Trajectory aligned = align({relative_to_first(pairs.estimate), truth}, alignment);
+  Metrics metrics = evaluate({aligned, pairs.truth}, options);
   metrics.alignment = alignment;
   // evaluate() moves its input back to the origin; the offset is meant where the fit has put it.
-  metrics.average_offset_m = average_offset_m(aligned, relative_to_first(ground_truth));
+  metrics.average_offset_m = average_offset_m({aligned, truth});
   metrics.ate_rmse = as_it_comes.ate_rmse;
   return metrics;
 }
@@ -226,13 +202,7 @@ Trajectory align_trajectory(std::span<const Rigid3> estimate,
                             std::span<const Rigid3> ground_truth,
                             Alignment alignment) {
   STEMVO_CHECK(!frames.empty() && frames.size() == ground_truth.size(), "a true pose per frame");
-  const Rigid3 first_from_world = estimate[frames.front()].inverse();
-  Trajectory moved;
-  moved.reserve(estimate.size());
-  for (const Rigid3& pose : estimate) {
-    moved.push_back(first_from_world * pose);
-  }
-  moved[frames.front()] = Rigid3();  // exactly
+  const Trajectory moved = relative_to(frames.front(), estimate);
   return transform(align_positions(positions(take_poses(moved, frames)),
                                    positions(relative_to_first(ground_truth)), alignment),
                    moved);

@@ -44,11 +44,9 @@ struct Metrics {
 /// Sum of the steps; at least one pose.
 [[nodiscard]] double length_of_path(std::span<const Rigid3> poses);
 
-/// KITTI devkit (vo_facts 4c: every 10th start frame), offset, ATE, RPE. Both have the same length
-/// (checked), at least one pose.
-[[nodiscard]] Metrics evaluate(std::span<const Rigid3> estimate,
-                               std::span<const Rigid3> ground_truth,
-                               const EvaluationOptions& options = {});
+/// KITTI devkit (vo_facts 4c: every 10th start frame), offset, ATE, RPE. At least one pose
+/// (checked).
+[[nodiscard]] Metrics evaluate(const PosePairs& given, const EvaluationOptions& options = {});
 
 /// Error of one segment, first frame to the first one more than `length_m` behind it.
 struct SegmentError {
@@ -58,10 +56,8 @@ struct SegmentError {
   double t_percent = 0.0;
   double r_deg_per_100m = 0.0;
 };
-/// The devkit's, one from every `first_frame_step`-th frame on, as far as they fit. Same length
-/// (checked).
-[[nodiscard]] std::vector<SegmentError> segment_errors(std::span<const Rigid3> estimate,
-                                                       std::span<const Rigid3> ground_truth,
+/// The devkit's, one from every `first_frame_step`-th frame on, as far as they fit.
+[[nodiscard]] std::vector<SegmentError> segment_errors(const PosePairs& pairs,
                                                        std::span<const double> lengths_m,
                                                        std::size_t first_frame_step);
 
@@ -72,22 +68,14 @@ struct DenseErrors {
   std::vector<double> r_deg_per_100m;
   std::size_t block = 1;  ///< neighbours that overlap
 };
-/// Empty: none fits (a path of length zero). Same length, at least one pose (checked).
-[[nodiscard]] DenseErrors dense_errors(std::span<const Rigid3> estimate,
-                                       std::span<const Rigid3> ground_truth,
-                                       std::size_t max_segments);
+/// Empty: none fits (a path of length zero). At least one pose (checked).
+[[nodiscard]] DenseErrors dense_errors(const PosePairs& pairs, std::size_t max_segments);
 
 /// As evaluate(), after the estimate was fitted to the ground truth, for trajectories without a
 /// scale. The four kinds of ATE and the null offset are those of the estimate as it comes.
-[[nodiscard]] Metrics evaluate_aligned(std::span<const Rigid3> estimate,
-                                       std::span<const Rigid3> ground_truth,
+[[nodiscard]] Metrics evaluate_aligned(const PosePairs& pairs,
                                        Alignment alignment,
                                        const EvaluationOptions& options = {});
-
-/// The paper's offset, (E_x + E_y) / N_f: mean of |dx| + |dz| between the poses as they are
-/// (KITTI's ground plane is x-z). Same length, at least one pose (checked).
-[[nodiscard]] double average_offset_m(std::span<const Rigid3> estimate,
-                                      std::span<const Rigid3> ground_truth);
 
 /// The estimate moved until the first of `frames`, those with a true pose, is the identity, and
 /// then fitted there to the ground truth (also moved). At least one of them (checked).

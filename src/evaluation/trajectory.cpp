@@ -14,7 +14,6 @@
 #include <fmt/core.h>
 #include <fmt/format.h>
 
-#include "internal_check.hpp"
 #include "text/text_file.hpp"
 #include "try.hpp"
 
@@ -251,18 +250,17 @@ Expected<Rigid3> pose_from_rows(const std::vector<double>& numbers) {
   return Rigid3::from_matrix(matrix);
 }
 
-Trajectory relative_to_first(std::span<const Rigid3> world_from_camera) {
-  Trajectory moved;
-  if (world_from_camera.empty()) {
-    return moved;
-  }
-  moved.reserve(world_from_camera.size());
-  const Rigid3 first_from_world = world_from_camera.front().inverse();
-  for (const Rigid3& pose : world_from_camera) {
-    moved.push_back(first_from_world * pose);
-  }
-  moved.front() = Rigid3();  // exactly
+Trajectory relative_to(std::size_t frame, std::span<const Rigid3> world_from_camera) {
+  const Rigid3 frame_from_world = world_from_camera[frame].inverse();
+  Trajectory moved(world_from_camera.size());
+  std::ranges::transform(world_from_camera, moved.begin(),
+                         [&](const Rigid3& pose) { return frame_from_world * pose; });
+  moved[frame] = Rigid3();  // exactly
   return moved;
+}
+
+Trajectory relative_to_first(std::span<const Rigid3> world_from_camera) {
+  return world_from_camera.empty() ? Trajectory() : relative_to(0, world_from_camera);
 }
 
 Eigen::Vector3d rescaled_step(std::span<const Rigid3> estimate,
@@ -276,12 +274,11 @@ Eigen::Vector3d rescaled_step(std::span<const Rigid3> estimate,
                               : Eigen::Vector3d::Zero();
 }
 
-Trajectory rescale_steps(std::span<const Rigid3> estimate, std::span<const Rigid3> ground_truth) {
-  STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
-  Trajectory rescaled(estimate.begin(), estimate.end());
+Trajectory rescale_steps(const PosePairs& pairs) {
+  Trajectory rescaled(pairs.estimate.begin(), pairs.estimate.end());
   for (std::size_t i = 1; i < rescaled.size(); ++i) {
     rescaled[i].translation =
-        rescaled[i - 1].translation + rescaled_step(estimate, ground_truth, i);
+        rescaled[i - 1].translation + rescaled_step(pairs.estimate, pairs.truth, i);
   }
   return rescaled;
 }
@@ -316,7 +313,6 @@ Status write_kitti_trajectory(const std::filesystem::path& file,
 Status write_tum_trajectory(const std::filesystem::path& file,
                             std::span<const double> timestamps_s,
                             std::span<const Rigid3> world_from_camera) {
-  STEMVO_CHECK(timestamps_s.size() == world_from_camera.size(), "one timestamp per pose");
   std::string text;
   for (std::size_t i = 0; i < world_from_camera.size(); ++i) {
     text += tum_row(timestamps_s[i], world_from_camera[i]);
@@ -361,11 +357,8 @@ TimePairs pair_by_time(std::span<const double> first_s,
 }
 
 Trajectory take_poses(std::span<const Rigid3> poses, std::span<const std::size_t> indices) {
-  Trajectory taken;
-  taken.reserve(indices.size());
-  for (const std::size_t index : indices) {
-    taken.push_back(poses[index]);
-  }
+  Trajectory taken(indices.size());
+  std::ranges::transform(indices, taken.begin(), [&](std::size_t index) { return poses[index]; });
   return taken;
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "internal_check.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/rigid3.hpp"
 
@@ -13,6 +14,18 @@ namespace stemvo {
 
 /// Poses world_from_camera, one per frame; metres.
 using Trajectory = std::vector<Rigid3>;
+
+/// Estimated poses and the true ones of the same frames: as many (checked).
+struct PosePairs {
+  PosePairs(std::span<const Rigid3> estimated, std::span<const Rigid3> ground_truth)
+      : estimate(estimated), truth(ground_truth) {
+    STEMVO_CHECK(estimate.size() == truth.size(), "one true pose per estimated pose");
+  }
+  [[nodiscard]] std::size_t size() const { return truth.size(); }
+
+  std::span<const Rigid3> estimate;
+  std::span<const Rigid3> truth;
+};
 
 /// [R | t] of 12 numbers, row by row, or of the first of more. Error: R is no rotation.
 [[nodiscard]] Expected<Rigid3> pose_from_rows(const std::vector<double>& numbers);
@@ -31,7 +44,8 @@ using Trajectory = std::vector<Rigid3>;
                                           std::span<const double> timestamps_s,
                                           std::span<const Rigid3> world_from_camera);
 
-/// Moves all poses so that the first one is the identity.
+/// Moves all poses so that the frame's, or the first one, is the identity.
+[[nodiscard]] Trajectory relative_to(std::size_t frame, std::span<const Rigid3> world_from_camera);
 [[nodiscard]] Trajectory relative_to_first(std::span<const Rigid3> world_from_camera);
 
 /// The step to pose i > 0 in its own direction with the true step's length; zero where it is zero.
@@ -39,9 +53,8 @@ using Trajectory = std::vector<Rigid3>;
                                             std::span<const Rigid3> ground_truth,
                                             std::size_t i);
 /// The paper's protocol: each step keeps its direction and takes the true step's length. A step of
-/// length zero stays. Rotations are untouched. Both have the same length.
-[[nodiscard]] Trajectory rescale_steps(std::span<const Rigid3> estimate,
-                                       std::span<const Rigid3> ground_truth);
+/// length zero stays. Rotations are untouched.
+[[nodiscard]] Trajectory rescale_steps(const PosePairs& pairs);
 
 /// Poses of a file of any format that is known, in the order of their times.
 struct PoseFile {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <memory>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -26,10 +27,7 @@ cv::Ptr<cv::Feature2D> create_feature(const FeatureOptions& options) {
 
 /// Strongest first; ties by place, so that the order never depends on the detector's threads.
 bool is_stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
-  if (a.response != b.response) {
-    return a.response > b.response;
-  }
-  return a.pt.y != b.pt.y ? a.pt.y < b.pt.y : a.pt.x < b.pt.x;
+  return std::tuple(-a.response, a.pt.y, a.pt.x) < std::tuple(-b.response, b.pt.y, b.pt.x);
 }
 
 /// Detect, describe, match by brute force: the paper's way (ORB) and the classic one (SIFT).

@@ -72,11 +72,8 @@ class KltFrontEnd final : public PointFrontEnd {
     if (from.points.empty()) {
       return result;
     }
-    std::vector<cv::Point2f> prev_uv;
-    prev_uv.reserve(from.points.size());
-    for (const Point& point : from.points) {
-      prev_uv.push_back(point.uv);
-    }
+    std::vector<cv::Point2f> prev_uv(from.points.size());
+    std::ranges::transform(from.points, prev_uv.begin(), &Point::uv);
     const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kMaxIterations,
                                     kConverged_px);
     std::vector<cv::Point2f> cur_uv;

@@ -7,7 +7,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -177,14 +176,7 @@ class PatchFrontEnd final : public PointFrontEnd {
     if (!cut_patch(pyramid, point.uv.x, point.uv.y, track.patch)) {
       return false;
     }
-    if (ended_.empty()) {
-      return tracks_.emplace(point.id, track).second;
-    }
-    auto node = std::move(ended_.back());
-    ended_.pop_back();
-    node.key() = point.id;
-    node.mapped() = track;
-    return tracks_.insert(std::move(node)).inserted;
+    return tracks_.emplace(point.id, track).second;
   }
 
   [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
@@ -299,7 +291,7 @@ class PatchFrontEnd final : public PointFrontEnd {
     const cv::Point2f off = uv - point.uv;
     if (found.correlation < kMinAgain || off.dot(off) > kMaxOff_px * kMaxOff_px) {
       if (!may_be_hidden) {
-        ended_.push_back(tracks_.extract(known));
+        tracks_.erase(known);
       }
       return std::nullopt;
     }
@@ -314,15 +306,11 @@ class PatchFrontEnd final : public PointFrontEnd {
       const auto found = std::ranges::lower_bound(points, id, {}, id_of);
       return found != points.end() && std::invoke(id_of, *found) == id;
     };
-    for (auto track = tracks_.begin(); track != tracks_.end();) {
-      const int id = track->first;
-      const bool goes_on = has(last, &Point::id, id) || has(good, &Point::id, id) ||
-                           has(expected, &Observation::track_id, id);
-      const auto current = track++;
-      if (!goes_on) {
-        ended_.push_back(tracks_.extract(current));
-      }
-    }
+    std::erase_if(tracks_, [&](const auto& track) {
+      const int id = track.first;
+      return !has(last, &Point::id, id) && !has(good, &Point::id, id) &&
+             !has(expected, &Observation::track_id, id);
+    });
   }
 
   [[nodiscard]] static bool accept(const PatchMatch& found,
@@ -345,8 +333,7 @@ class PatchFrontEnd final : public PointFrontEnd {
     return cut_patch(image.bordered, found.warp.x, found.warp.y, track.patch);
   }
 
-  std::map<int, Track> tracks_;                         ///< by id
-  std::vector<std::map<int, Track>::node_type> ended_;  ///< their memory is that of new ones
+  std::map<int, Track> tracks_;  ///< by id
 };
 
 }  // namespace

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "features/point_front_end.hpp"
 
-#include <algorithm>
 #include <cstddef>
-#include <utility>
 
 #include <opencv2/imgproc.hpp>
 
-#include "features/front_end.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {

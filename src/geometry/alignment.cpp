@@ -3,12 +3,11 @@
 
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <Eigen/SVD>
-
-#include "internal_check.hpp"
 
 namespace stemvo {
 namespace {
@@ -17,11 +16,8 @@ namespace {
 constexpr double kRounding = 1e-24;
 
 Eigen::Vector3d mean(std::span<const Eigen::Vector3d> points) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& point : points) {
-    sum += point;
-  }
-  return sum / static_cast<double>(points.size());
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  return std::accumulate(points.begin(), points.end(), zero) / static_cast<double>(points.size());
 }
 
 Similarity3 scale_about_origin(std::span<const Eigen::Vector3d> source,
@@ -96,7 +92,6 @@ Similarity3 umeyama(std::span<const Eigen::Vector3d> source,
 Similarity3 align_positions(std::span<const Eigen::Vector3d> source,
                             std::span<const Eigen::Vector3d> target,
                             Alignment alignment) {
-  STEMVO_CHECK(source.size() == target.size(), "positions come in pairs");
   if (source.empty() || alignment == Alignment::kNone) {
     return {};
   }

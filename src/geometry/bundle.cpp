@@ -5,13 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <utility>
 
 #include <Eigen/Cholesky>
 
 #include "geometry/minimize.hpp"
 #include "geometry/normal_equations.hpp"
-#include "internal_check.hpp"
 
 namespace stemvo {
 namespace {
@@ -25,10 +23,8 @@ constexpr double kFirstDamping = 1e-7;
 constexpr int kCamera = NormalEquations::kCamera;
 
 std::vector<Eigen::Matrix3d> rotations_of(const Bundle& bundle) {
-  std::vector<Eigen::Matrix3d> rotations;
-  for (const Rigid3& pose : bundle.camera_from_world) {
-    rotations.push_back(pose.rotation_matrix());
-  }
+  std::vector<Eigen::Matrix3d> rotations(bundle.camera_from_world.size());
+  std::ranges::transform(bundle.camera_from_world, rotations.begin(), &Rigid3::rotation_matrix);
   return rotations;
 }
 
@@ -41,11 +37,6 @@ void copy(const NormalEquations::Block<kColumns>& from,
       to(r, static_cast<int>(c)) = from[c][r];
     }
   }
-}
-
-void move_camera(const IntrinsicsDelta& change, Bundle& bundle) {
-  bundle.camera = changed(bundle.camera, change);
-  bundle.radial += change.tail<2>();
 }
 
 /// The normal equations without the points: the camera first, then the free poses.
@@ -83,9 +74,9 @@ class ReducedEquations {
     diagonal_ = columns.col(1);
   }
 
-  /// Moves `bundle` by the solution; false where there is none.
+  /// Moves `bundle`, whose camera `so_far` has changed, by the solution; false where there is none.
   [[nodiscard]] bool step(double damping,
-                          const IntrinsicsDelta& from_prior,
+                          const IntrinsicsDelta& so_far,
                           Bundle& bundle,
                           IntrinsicsDelta& camera_change) const {
     Eigen::MatrixXd damped = reduced_;
@@ -93,7 +84,7 @@ class ReducedEquations {
     damped.diagonal() += damping * diagonal_;
     if (num_camera_ > 0) {
       damped.topLeftCorner<kCamera, kCamera>() += options_.camera->information;
-      gradient.head<kCamera>() += options_.camera->information * from_prior;
+      gradient.head<kCamera>() += options_.camera->information * (so_far - options_.camera->mean);
     }
     const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> solver(damped);
     const Eigen::VectorXd change = -solver.solve(gradient);
@@ -111,7 +102,8 @@ class ReducedEquations {
     }
     if (num_camera_ > 0) {
       camera_change = change.head<kCamera>();
-      move_camera(camera_change, bundle);
+      bundle.camera = changed(bundle.camera, camera_change);
+      bundle.radial += camera_change.tail<2>();
     }
     return true;
   }
@@ -196,12 +188,6 @@ double reproject(const Bundle& bundle, double loss_scale_px, std::vector<Reproje
 }  // namespace
 
 BundleResult solve_bundle_adjustment(Bundle& bundle, const BundleOptions& options) {
-  const auto place = [](const Bundle::Observation& observation) {
-    return std::pair(observation.point, observation.pose);
-  };
-  STEMVO_CHECK(std::ranges::adjacent_find(bundle.observations, std::ranges::greater_equal{},
-                                          place) == bundle.observations.end(),
-               "observations are ordered by point, then by pose, and none comes twice");
   BundleResult result;
   const auto prior_cost = [&](const IntrinsicsDelta& change) {
     const IntrinsicsDelta off =
@@ -224,9 +210,7 @@ BundleResult solve_bundle_adjustment(Bundle& bundle, const BundleOptions& option
     equations.linearize(bundle, at, damping);
     before = static_cast<const BundleState&>(bundle);
     IntrinsicsDelta change = IntrinsicsDelta::Zero();
-    const IntrinsicsDelta from_prior =
-        options.camera ? IntrinsicsDelta(result.camera_change - options.camera->mean) : change;
-    const bool is_solved = equations.step(damping, from_prior, bundle, change);
+    const bool is_solved = equations.step(damping, result.camera_change, bundle, change);
     change = compose(result.camera_change, change);
     const double cost =
         is_solved ? reproject(bundle, options.loss_scale_px, trial_at) + prior_cost(change)

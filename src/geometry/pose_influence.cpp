@@ -9,7 +9,6 @@
 
 #include "geometry/minimize.hpp"
 #include "geometry/residuals.hpp"
-#include "internal_check.hpp"
 
 namespace stemvo {
 namespace {
@@ -46,7 +45,6 @@ PoseInfluences pose_influences(const Rigid3& camera_from_world,
                                std::span<const Eigen::Vector2d> uv,
                                const Camera& camera,
                                double loss_scale_px) {
-  STEMVO_CHECK(points_in_world.size() == uv.size(), "points and pixels are paired");
   struct Pull {
     std::size_t point = 0;
     Eigen::Matrix<double, 6, 2> jacobian;  ///< transposed, times the weight

@@ -4,11 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <vector>
 
 #include "geometry/minimize.hpp"
 #include "geometry/residuals.hpp"
-#include "internal_check.hpp"
 
 namespace stemvo {
 namespace {
@@ -214,7 +212,6 @@ Rigid3 refine_absolute_pose(const Rigid3& camera_from_world,
                             std::span<const Eigen::Vector2d> uv,
                             const Camera& camera,
                             const RefinementOptions& options) {
-  STEMVO_CHECK(points_in_world.size() == uv.size(), "points and pixels are paired");
   Rigid3 refined = camera_from_world;
   if (uv.size() >= 4) {
     minimize<6>(

@@ -16,13 +16,11 @@ namespace stemvo::internal {
 struct CorrectedMatch {
   Eigen::Vector2d prev;
   Eigen::Vector2d cur;
-  double squared_shift_prev = 0.0;
-  double squared_shift_cur = 0.0;
 };
 
 /// Lindstrom, "Triangulation Made Easy" (CVPR 2010), the variant with two steps: the reprojection
 /// error is the least possible one, in a fixed number of operations. `fundamental` and the points
-/// may be in any units; the shifts have the units of the points.
+/// may be in any units.
 inline CorrectedMatch correct_match(const Eigen::Matrix3d& fundamental,
                                     const Eigen::Vector2d& prev,
                                     const Eigen::Vector2d& cur) {
@@ -41,12 +39,7 @@ inline CorrectedMatch correct_match(const Eigen::Matrix3d& fundamental,
   normal_cur -= top * step_prev;
   normal_prev -= top.transpose() * step_cur;
   const double second = first * 2.0 * d / (normal_cur.squaredNorm() + normal_prev.squaredNorm());
-  CorrectedMatch result;
-  result.cur = cur - second * normal_cur;
-  result.prev = prev - second * normal_prev;
-  result.squared_shift_cur = (result.cur - cur).squaredNorm();
-  result.squared_shift_prev = (result.prev - prev).squaredNorm();
-  return result;
+  return {prev - second * normal_prev, cur - second * normal_cur};
 }
 
 /// Where two rays meet: X_cur = depth_cur * (cur, 1), X_prev = depth_prev * (prev, 1).

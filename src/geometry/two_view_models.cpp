@@ -2,12 +2,10 @@
 #include "geometry/two_view_models.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <utility>
 
-#include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <Eigen/SVD>
@@ -67,10 +65,7 @@ ModelScore score_matches(const PixelPairs& pairs,
         ++num_within;
       }
     }
-    if (num_within == 2) {
-      result.inlier_mask[i] = 1;
-      ++result.num_inliers;
-    }
+    result.inlier_mask[i] = num_within == 2 ? 1 : 0;
   }
   return result;
 }
@@ -129,11 +124,12 @@ class PointJudge {
   /// Cosine of the angle at which a good point sees the two cameras; nullopt: it is bad.
   [[nodiscard]] std::optional<double> judge(const Eigen::Vector2d& prev_uv,
                                             const Eigen::Vector2d& cur_uv) const {
-    const internal::CorrectedMatch match =
-        internal::correct_match(fundamental_, prev_uv - center_, cur_uv - center_);
+    const Eigen::Vector2d prev = prev_uv - center_;
+    const Eigen::Vector2d cur = cur_uv - center_;
+    const internal::CorrectedMatch match = internal::correct_match(fundamental_, prev, cur);
     // Negated, so that NaN is bad.
-    if (!(match.squared_shift_prev <= max_squared_error_) ||
-        !(match.squared_shift_cur <= max_squared_error_)) {
+    if (!((match.prev - prev).squaredNorm() <= max_squared_error_) ||
+        !((match.cur - cur).squaredNorm() <= max_squared_error_)) {
       return std::nullopt;
     }
     const internal::RayMeeting meeting =
@@ -172,7 +168,7 @@ ModelScore score_homography(const Eigen::Matrix3d& homography,
                             const PixelPairs& pairs,
                             double sigma_px) {
   if (is_singular(homography)) {
-    return {0.0, 0, std::vector<char>(pairs.size(), 0)};
+    return {0.0, std::vector<char>(pairs.size(), 0)};
   }
   const Eigen::Matrix3d prev_from_cur = adjugate(homography);
   return score_matches(pairs, sigma_px, kHomographyChi2,

@@ -21,8 +21,7 @@ inline constexpr double kFundamentalChi2 = 3.841;
 /// Score of one two-view model over all matches, paper eq. (5) and (6).
 struct ModelScore {
   double score = 0.0;
-  int num_inliers = 0;            ///< matches within the bound in both directions
-  std::vector<char> inlier_mask;  ///< one per match
+  std::vector<char> inlier_mask;  ///< one per match: within the bound in both directions
 };
 
 /// S_H of x_cur ~ H x_prev (H = cur_from_prev, pixels). A singular H scores 0.

@@ -10,7 +10,7 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
-namespace stemvo::internal {
+namespace stemvo {
 namespace {
 
 /// Least depth of a point that is scaled to the length of its ray in the anchor.
@@ -217,4 +217,4 @@ std::vector<Matrix6> clustered_covariances(ceres::Problem& problem,
   return result;
 }
 
-}  // namespace stemvo::internal
+}  // namespace stemvo

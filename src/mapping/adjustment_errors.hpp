@@ -14,7 +14,7 @@
 #include "stemvo/camera.hpp"
 #include "stemvo/rigid3.hpp"
 
-namespace stemvo::internal {
+namespace stemvo {
 
 /// camera_from_map: x = exp(w) rotation X + translation + v, with (w, v) the unknowns.
 struct AdjustedPose {
@@ -177,4 +177,4 @@ struct ClusteredResidual {
     const std::vector<double*>& asked,
     double sigma_factor);
 
-}  // namespace stemvo::internal
+}  // namespace stemvo

@@ -3,14 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <cstring>
 #include <limits>
 
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
-
-#include "instruction_set.hpp"
 
 namespace stemvo {
 namespace {

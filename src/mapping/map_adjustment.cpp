@@ -4,29 +4,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <iterator>
 #include <memory>
 #include <utility>
-#include <vector>
 
 #include <ceres/ceres.h>
 #include <ceres/normal_prior.h>
 
 #include "geometry/median.hpp"
 #include "geometry/radial_lens.hpp"
-#include "internal_check.hpp"
 #include "mapping/adjustment_errors.hpp"
 #include "mapping/pose_graph.hpp"
 
 namespace stemvo {
 namespace {
-
-using internal::AdjustedPoint;
-using internal::AdjustedPose;
-using internal::CornerError;
-using internal::DistanceError;
-using internal::EdgeError;
 
 /// Two keyframes with fewer landmarks in common are held by their motion as well, and loops with
 /// fewer corners by theirs.
@@ -141,7 +132,7 @@ class Adjustment {
       std::vector<Eigen::Vector2d> rays;
       std::ranges::transform(track, std::back_inserter(rays),
                              [&](const MapView& view) { return ray(view); });
-      if (AdjustedPoint point; internal::triangulate(poses_, track, rays, point)) {
+      if (AdjustedPoint point; triangulate(poses_, track, rays, point)) {
         points_.push_back(point);
         tracks_.push_back(std::move(track));
       }
@@ -338,8 +329,7 @@ class Adjustment {
     for (const int i : options_.covariance_of) {
       asked.push_back(poses_[slot(i)].delta.data());
     }
-    const auto found =
-        internal::clustered_covariances(problem_, free, residuals_, asked, kLikeErrors);
+    const auto found = clustered_covariances(problem_, free, residuals_, asked, kLikeErrors);
     result.camera.sigma = found.front().diagonal().head<5>().cwiseSqrt();
     for (std::size_t i = 0; i < options_.covariance_of.size(); ++i) {
       const AdjustedPose& pose = poses_[slot(options_.covariance_of[i])];
@@ -360,7 +350,7 @@ class Adjustment {
   double median_error_px_ = 0.0;
   double sigma_px_ = 1.0;
   std::vector<Corner> corners_;
-  std::vector<internal::ClusteredResidual> residuals_;
+  std::vector<ClusteredResidual> residuals_;
   ceres::LossFunctionWrapper corner_loss_{nullptr, ceres::TAKE_OWNERSHIP};
   ceres::CauchyLoss loop_loss_{kLooseLoop};
   ceres::Problem problem_;
@@ -369,7 +359,6 @@ class Adjustment {
 }  // namespace
 
 std::optional<MapAdjustment> adjust_map(const KeptMap& map, const MapAdjustmentOptions& options) {
-  STEMVO_CHECK(map.map_from_keyframe.size() == map.keyframes.size(), "each keyframe has a node");
   if (map.keyframes.size() < 2) {
     return std::nullopt;
   }

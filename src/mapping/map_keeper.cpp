@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <utility>
-#include <vector>
 
 #include "geometry/median.hpp"
 #include "geometry/pose_influence.hpp"
@@ -35,10 +33,6 @@ constexpr double kMotionLogScale = 6e-3;
 /// A guess's standard deviations of the rotation, and of log(scale).
 constexpr double kGuess_rad = 1.0;
 constexpr double kGuessLogScale = 1.0;
-
-Similarity3 scaled(double factor, const Rigid3& motion) {
-  return {1.0, motion.rotation, factor * motion.translation};
-}
 
 /// How well the landmarks that both keyframes see carry the scale over: each by the parallax that
 /// its depth comes from, of points with a noise of 1 px.
@@ -69,8 +63,10 @@ MapEdge motion_between(const WindowView& view, const Keyframe& from, const Keyfr
   const double units_of_from = view.history.units(from.frame);
   const double units_of_to = view.history.units(to.frame);
   const Rigid3 from_to = from.world_from_camera.inverse() * to.world_from_camera;
-  MapEdge edge{.from = node, .to = node + 1, .from_to = scaled(units_of_from, from_to)};
-  edge.from_to.scale = units_of_from / units_of_to;
+  MapEdge edge{.from = node,
+               .to = node + 1,
+               .from_to = {units_of_from / units_of_to, from_to.rotation,
+                           units_of_from * from_to.translation}};
   const SeenLandmarks seen = find_seen_landmarks(view.window, to.points);
   const Rigid3 camera_from_world = to.world_from_camera.inverse();
   std::vector<double> errors;
@@ -306,10 +302,7 @@ void MapKeeper::apply(std::span<const Similarity3> solved) {
 }
 
 std::vector<int> MapKeeper::merge() {
-  int end = static_cast<int>(map_.keyframes.size());
-  for (const auto& [frame, node] : nodes_) {
-    end = std::min(end, node);
-  }
+  const int end = nodes_.empty() ? static_cast<int>(map_.keyframes.size()) : nodes_.begin()->second;
   std::vector<int> numbers = merge_known_terrain(map_, end);
   if (numbers.empty()) {
     return numbers;
@@ -326,7 +319,7 @@ std::vector<int> MapKeeper::merge() {
   return numbers;
 }
 
-void MapKeeper::keep(const WindowView& view, std::size_t leaving) {
+void MapKeeper::leave(const WindowView& view, std::size_t leaving) {
   const Keyframe& keyframe = view.window.keyframes[leaving];
   const int node = node_of(keyframe.frame);
   if (node < 0) {
@@ -349,6 +342,7 @@ void MapKeeper::keep(const WindowView& view, std::size_t leaving) {
       map_.motions.push_back(motion_between(view, keyframe, other, node));
     }
   }
+  nodes_.erase(keyframe.frame);
 }
 
 }  // namespace stemvo

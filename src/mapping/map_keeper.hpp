@@ -52,10 +52,7 @@ class MapKeeper {
     }
   }
   /// A keyframe is about to leave the window.
-  void leave(const WindowView& view, std::size_t leaving) {
-    keep(view, leaving);
-    nodes_.erase(view.window.keyframes[leaving].frame);
-  }
+  void leave(const WindowView& view, std::size_t leaving);
   /// The whole window is about to be dropped; the next one is a new map.
   void close(const WindowView& view) {
     last_localized_ = view.last_localized;
@@ -117,7 +114,6 @@ class MapKeeper {
   void connect_first(KeptKeyframe& kept);
   void reopen_last(const Keyframe& keyframe);
   void find_components();
-  void keep(const WindowView& view, std::size_t leaving);
 
   KeptMap map_;
   std::vector<int> components_;  ///< of each node the map that it belongs to, the older the lower

@@ -181,17 +181,14 @@ class Merge {
 }  // namespace
 
 MapEdge chained(const MapEdge& a, const MapEdge& b) {
-  MapEdge edge;
-  edge.from = a.from;
-  edge.to = b.to;
-  edge.from_to = a.from_to * b.from_to;
   const double arm = a.from_to.scale * b.from_to.translation.norm();
-  edge.sigma_rad = std::hypot(a.sigma_rad, b.sigma_rad);
-  edge.sigma_translation =
-      std::hypot(std::hypot(a.sigma_translation, a.from_to.scale * b.sigma_translation),
-                 arm * std::hypot(a.sigma_rad, a.sigma_log_scale));
-  edge.sigma_log_scale = std::hypot(a.sigma_log_scale, b.sigma_log_scale);
-  return edge;
+  const double shift = std::hypot(a.sigma_translation, a.from_to.scale * b.sigma_translation);
+  return {.from = a.from,
+          .to = b.to,
+          .from_to = a.from_to * b.from_to,
+          .sigma_rad = std::hypot(a.sigma_rad, b.sigma_rad),
+          .sigma_translation = std::hypot(shift, arm * std::hypot(a.sigma_rad, a.sigma_log_scale)),
+          .sigma_log_scale = std::hypot(a.sigma_log_scale, b.sigma_log_scale)};
 }
 
 MapEdge reversed(const MapEdge& edge) {

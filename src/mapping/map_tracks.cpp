@@ -2,7 +2,6 @@
 #include "mapping/map_tracks.hpp"
 
 #include <algorithm>
-#include <cstddef>
 #include <cstdint>
 #include <numeric>
 #include <unordered_map>

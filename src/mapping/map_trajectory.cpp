@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <iterator>
 
-#include "internal_check.hpp"
 #include "mapping/kept_map.hpp"
 
 namespace stemvo {
@@ -74,7 +73,6 @@ std::vector<Placed> placed_frames(const KeptMap& map, int num_frames) {
 std::vector<Similarity3> place_trajectory(std::span<const Rigid3> world_from_camera,
                                           std::span<const double> times_s,
                                           const KeptMap& map) {
-  STEMVO_CHECK(world_from_camera.size() == times_s.size(), "a time per pose");
   const std::vector<Placed> placed = placed_frames(map, static_cast<int>(times_s.size()));
   // A keyframe's own time is of another clock.
   const auto time_of = [&](const Placed& frame) {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <utility>
 
 #include "geometry/median.hpp"
 #include "mapping/descriptors.hpp"
@@ -120,7 +119,7 @@ void Mapper::begin_lookup(const WindowView& view) {
     KeptKeyframe& keyframe = work.keyframe;
     keyframe.descriptors = describe(image->channel, keyframe.corners, roll);
     work.loop = recognizer_.recognize(
-        keeper_.map(), keeper_.components(), work.node, keyframe, [&](const OtherLook& look) {
+        {keeper_.map(), keeper_.components(), work.node, keyframe}, [&](const OtherLook& look) {
           return describe(image->channel, keyframe.corners, roll + look.roll_rad, look.scale);
         });
     if (work.loop.has_value()) {

@@ -59,13 +59,15 @@ Eigen::Vector2d uv_of(const PlaceView& view, int index) {
   return corner_of(view, index).uv.cast<double>();
 }
 
-int num_cells(const std::vector<Eigen::Vector2d>& uv, const Camera& camera) {
+/// Cells of the image of `by` in which pairs are.
+int num_cells(const PlaceView& by, const std::vector<DescriptorPair>& pairs) {
   std::vector<char> cells(static_cast<std::size_t>(kColumns * kRows));
-  for (const Eigen::Vector2d& point : uv) {
+  for (const auto& [mine, other] : pairs) {
+    const Eigen::Vector2d point = uv_of(by, other);
     const int column =
-        std::clamp(static_cast<int>(kColumns * point.x() / camera.width_px), 0, kColumns - 1);
+        std::clamp(static_cast<int>(kColumns * point.x() / by.camera.width_px), 0, kColumns - 1);
     const int row =
-        std::clamp(static_cast<int>(kRows * point.y() / camera.height_px), 0, kRows - 1);
+        std::clamp(static_cast<int>(kRows * point.y() / by.camera.height_px), 0, kRows - 1);
     cells[static_cast<std::size_t>(row * kColumns + column)] = 1;
   }
   return static_cast<int>(std::ranges::count(cells, char{1}));
@@ -244,11 +246,7 @@ std::vector<DescriptorPair> agreeing(const Similarity3& old_from_recent,
 bool is_enough(const PlaceView& by,
                const std::vector<DescriptorPair>& inliers,
                const Least& least) {
-  std::vector<Eigen::Vector2d> uv;
-  for (const auto& [mine, other] : inliers) {
-    uv.push_back(uv_of(by, other));
-  }
-  return uv.size() >= least.num_inliers && num_cells(uv, by.camera) >= least.num_cells;
+  return inliers.size() >= least.num_inliers && num_cells(by, inliers) >= least.num_cells;
 }
 
 double median_error_px(const Similarity3& recent_from_old,

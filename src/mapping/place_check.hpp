@@ -5,8 +5,6 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "mapping/descriptors.hpp"
 #include "mapping/kept_map.hpp"
 #include "stemvo/camera.hpp"

@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "mapping/place_recognizer.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <functional>
 #include <iterator>
 #include <limits>
 #include <ranges>
 
 #include "geometry/median.hpp"
-#include "mapping/place_candidates.hpp"
 
 namespace stemvo {
 namespace {
@@ -45,11 +41,8 @@ constexpr double kMaxMotion_rad = 0.3;
 constexpr double kMaxMotion = 0.5;
 
 std::vector<int> track_ids_of(const KeptKeyframe& keyframe) {
-  std::vector<int> tracks;
-  for (const KeptCorner& corner : keyframe.corners) {
-    tracks.push_back(corner.track_id);
-  }
-  return tracks;
+  const auto tracks = keyframe.corners | std::views::transform(&KeptCorner::track_id);
+  return {tracks.begin(), tracks.end()};
 }
 
 std::size_t num_shared(const std::vector<int>& a, const std::vector<int>& b) {
@@ -135,13 +128,11 @@ void PlaceRecognizer::begin_lookup(const KeptKeyframe& keyframe) {
   sightings_.begin_lookup(num_lookups_, depth_);
 }
 
-std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
-                                               std::span<const int> components,
-                                               int number,
-                                               const KeptKeyframe& keyframe,
+std::optional<Loop> PlaceRecognizer::recognize(const Question& question,
                                                const DescribeAs& describe_as) {
+  const KeptMap& map = question.map;
+  const KeptKeyframe& keyframe = question.keyframe;
   begin_lookup(keyframe);
-  const Question question{map, components, number, keyframe};
   // Poses tell the scale and the roll of places that they connect.
   LookDescriptors described(keyframe.descriptors, describe_as);
   const bool has_others = std::ranges::any_of(

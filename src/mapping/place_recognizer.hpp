@@ -47,10 +47,19 @@ class PlaceRecognizer {
   /// The loop's corners are those of both keyframes as they are given here.
   /// `components`: of each keyframe of the map the one it belongs to. Where a loop is to join two
   /// of this recording, more sightings must agree: no motion says where they lie.
-  [[nodiscard]] std::optional<Loop> recognize(const KeptMap& map,
-                                              std::span<const int> components,
-                                              int number,
-                                              const KeptKeyframe& keyframe,
+  struct Question {
+    const KeptMap& map;
+    std::span<const int> components;
+    int number;
+    const KeptKeyframe& keyframe;
+
+    /// In a map that nothing connects with the keyframe's.
+    [[nodiscard]] bool is_elsewhere(int place) const {
+      return components[static_cast<std::size_t>(place)] !=
+             components[static_cast<std::size_t>(number)];
+    }
+  };
+  [[nodiscard]] std::optional<Loop> recognize(const Question& question,
                                               const DescribeAs& describe_as = {});
   /// The last one that was looked up shows a place that is kept: it needs not become one.
   [[nodiscard]] bool shows_kept_place() const { return shows_kept_place_; }
@@ -88,19 +97,6 @@ class PlaceRecognizer {
     int place = 0;
     std::span<const Descriptor> seen;
     std::optional<Expectation> expected = {};
-  };
-  /// What recognize() is asked.
-  struct Question {
-    const KeptMap& map;
-    std::span<const int> components;
-    int number;
-    const KeptKeyframe& keyframe;
-
-    /// In a map that nothing connects with the keyframe's.
-    [[nodiscard]] bool is_elsewhere(int place) const {
-      return components[static_cast<std::size_t>(place)] !=
-             components[static_cast<std::size_t>(number)];
-    }
   };
   /// Looks at each place once in each way, and then at those that `look_at` names for what it sees
   /// in these, until it is enough: nullopt.

@@ -9,7 +9,7 @@ namespace stemvo {
 
 /// Moves map_from_keyframe to where motions, loops and lengths agree best, from where it is. Node
 /// 0 stays; its scale moves where the map has lengths, which make the map's unit a metre.
-/// Motions and lengths are believed; sigmas are above 0 (checked). A loop is under Cauchy's loss:
+/// Motions and lengths are believed; sigmas are above 0. A loop is under Cauchy's loss:
 /// where the others contradict it by many sigmas it pulls no more. One thread, no clock: the same
 /// bytes on every run. False: nothing to do, or not solved; the map is unchanged.
 bool solve_pose_graph(KeptMap& map);

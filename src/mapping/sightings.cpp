@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "mapping/sightings.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <iterator>
 #include <ranges>
 #include <set>

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/channel_odometry.hpp"
 
-#include <utility>
-
-#include "internal_check.hpp"
-#include "odometry/frame_clock.hpp"
 #include "odometry/pair_estimator.hpp"
 #include "odometry/road/image.hpp"
 #include "odometry/window_estimator.hpp"
@@ -66,7 +62,6 @@ Frame ChannelOdometry::prepare(const Channel& channel,
 
 /// Uses the front end only: the frame before may be optimized meanwhile.
 void ChannelOdometry::track(Frame frame) {
-  STEMVO_CHECK(!tracked_.has_value(), "the frame before is localized");
   frame.given_time_s = frame.time_s;
   frame.time_s = clock_.advance(frame.given_time_s);
   for (Way& way : frame.ways) {
@@ -114,8 +109,6 @@ ImageClue ChannelOdometry::clue_of(Frame& frame) {
 }
 
 void ChannelOdometry::localize() {
-  STEMVO_CHECK(tracked_.has_value(), "a frame was tracked");
-  STEMVO_CHECK(!localized_.has_value(), "the frame before is optimized");
   FrameInWork& work = localized_.emplace(FrameInWork{*std::exchange(tracked_, std::nullopt), {}});
   Stopwatch watch;
   work.localized = estimator_->localize(work.frame);
@@ -130,7 +123,6 @@ void ChannelOdometry::localize() {
 
 /// Uses all but the front end.
 FrameResult ChannelOdometry::optimize() {
-  STEMVO_CHECK(localized_.has_value(), "a frame was localized");
   FrameInWork work = *std::exchange(localized_, std::nullopt);
   Stopwatch watch;
   estimator_->optimize(work.frame, work.localized);

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "geometry/pose_refinement.hpp"
@@ -103,7 +102,7 @@ std::vector<char> flags_of(const Matches& matches,
 }  // namespace
 
 bool Initializer::lost_reference(const Observations& now) const {
-  const auto living = static_cast<double>(common_points(reference_.points, now).size());
+  const auto living = static_cast<double>(common_points(reference_.points, now).cur_uv.size());
   return living < kMinLiving * static_cast<double>(reference_.points.size());
 }
 
@@ -114,7 +113,7 @@ MeasuredMotion Initializer::measure(const Matches& matches,
   if (reference_.points.empty()) {
     reference_.points = previous_points(matches, all);
   }
-  const PointPairs pairs = common_points(reference_.points, now);
+  const Matches pairs = common_points(reference_.points, now);
   const PixelPairs pixels(pairs.prev_uv, pairs.cur_uv);
   MeasuredMotion motion = measure_world(pixels, camera);
   motion.inlier_mask = flags_of(matches, pairs.track_ids, motion.inlier_mask, 1);

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "odometry/road/image.hpp"
-#include "odometry/tracks.hpp"
 #include "odometry/two_view_estimator.hpp"
 #include "odometry/window.hpp"
 #include "stemvo/camera.hpp"

@@ -33,9 +33,7 @@ std::optional<Localization> optimize_pose(const SeenLandmarks& seen,
   const Rigid3 first = refine_absolute_pose(start_camera_from_world, seen.points, seen.uv, camera,
                                             {.loss_scale_px = options.first_loss_px});
   const std::vector<char> mask = find_inliers(seen, first, camera, 2.0 * options.inlier_bound_px);
-  const SeenLandmarks near{select<Eigen::Vector3d>(seen.points, mask),
-                           select<Eigen::Vector2d>(seen.uv, mask),
-                           select<int>(seen.track_ids, mask)};
+  const SeenLandmarks near = select(seen, mask);
   if (near.size() < options.min_landmarks) {
     return std::nullopt;
   }
@@ -52,20 +50,17 @@ std::optional<Localization> optimize_pose(const SeenLandmarks& seen,
   return Localization{second.inverse(), count(seen)};
 }
 
-Eigen::Quaterniond rotation_between(const PixelPairs& pairs, const Camera& camera) {
-  return refine_rotation(Eigen::Quaterniond::Identity(), pairs, camera, {.max_iterations = 5});
-}
-
 }  // namespace
+
+SeenLandmarks select(const SeenLandmarks& seen, const std::vector<char>& mask) {
+  return {select(seen.points, mask), select(seen.uv, mask), select(seen.track_ids, mask)};
+}
 
 SeenLandmarks find_seen_landmarks(const Window& window, const Observations& frame) {
   SeenLandmarks seen;
-  auto landmark = window.landmarks.begin();
   for (const Observation& point : frame) {
-    while (landmark != window.landmarks.end() && landmark->first < point.track_id) {
-      ++landmark;
-    }
-    if (landmark != window.landmarks.end() && landmark->first == point.track_id) {
+    const auto landmark = window.landmarks.find(point.track_id);
+    if (landmark != window.landmarks.end()) {
       seen.points.push_back(landmark->second);
       seen.uv.push_back(point.uv);
       seen.track_ids.push_back(point.track_id);
@@ -80,13 +75,9 @@ Observations project_lost_landmarks(const Window& window,
                                     const Camera& camera) {
   const Rigid3 camera_from_world = world_from_camera.inverse();
   Observations lost;
-  auto seen = frame.begin();
   for (const auto& [track_id, point_in_world] : window.landmarks) {
-    while (seen != frame.end() && seen->track_id < track_id) {
-      ++seen;
-    }
     const Eigen::Vector3d point = camera_from_world * point_in_world;
-    if ((seen == frame.end() || seen->track_id != track_id) && point.z() > 0.0) {
+    if (point.z() > 0.0 && find_point(frame, track_id) == nullptr) {
       lost.push_back({track_id, camera.project(point)});
     }
   }
@@ -159,7 +150,9 @@ std::optional<double> parallax_since_px(const Eigen::Vector3d& position,
     return std::nullopt;
   }
   const PixelPairs moved(held_uv, moved_uv);
-  return rms_parallax_px(rotation_between(moved, camera), moved, camera);
+  const Eigen::Quaterniond turn =
+      refine_rotation(Eigen::Quaterniond::Identity(), moved, camera, {.max_iterations = 5});
+  return rms_parallax_px(turn, moved, camera);
 }
 
 }  // namespace stemvo

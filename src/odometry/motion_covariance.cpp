@@ -5,9 +5,12 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include <Eigen/LU>
+
+#include "odometry/localization.hpp"
 
 namespace stemvo {
 namespace {
@@ -38,11 +41,10 @@ Matrix6d diagonal(double translation, double rotation) {
   return sigma.cwiseAbs2().asDiagonal();
 }
 
-PoseInfluences influences_at(const SeenLandmarks& seen,
+PoseInfluences influences_of(const SeenLandmarks& seen,
                              const Rigid3& world_from_camera,
-                             const Camera& camera,
-                             double loss_px) {
-  return pose_influences(world_from_camera.inverse(), seen.points, seen.uv, camera, loss_px);
+                             const MotionCovariance::InMap& at) {
+  return pose_influences(world_from_camera.inverse(), seen.points, seen.uv, at.camera, at.loss_px);
 }
 
 /// A shift of the principal point turns all poses alike.
@@ -81,21 +83,16 @@ Matrix6d two_view_motion(const MotionCovariance::Motion& motion) {
 
 }  // namespace
 
-void MotionCovariance::localized(const Window& window,
-                                 const Observations& points,
-                                 const Rigid3& world_from_camera,
-                                 const Rigid3& world_from_prev,
-                                 const Camera& camera,
-                                 double loss_px) {
+void MotionCovariance::localized(const InMap& at, const Observations& points) {
   points_ = points;
-  const SeenLandmarks now = find_seen_landmarks(window, points);
-  influences_ = influences_at(now, world_from_camera, camera, loss_px);
+  const SeenLandmarks now = find_seen_landmarks(at.window, points);
+  influences_ = influences_of(now, at.world_from_camera, at);
   if (!is_prev_localized_) {
     return;
   }
-  const SeenLandmarks before = find_seen_landmarks(window, prev_points_);
-  const PoseInfluences prev = influences_at(before, world_from_prev, camera, loss_px);
-  const Matrix6d to_cur = adjoint(world_from_camera.inverse() * world_from_prev);
+  const SeenLandmarks before = find_seen_landmarks(at.window, prev_points_);
+  const PoseInfluences prev = influences_of(before, at.world_from_prev, at);
+  const Matrix6d to_cur = adjoint(at.world_from_camera.inverse() * at.world_from_prev);
   std::map<int, Vector6d> of_track;
   for (std::size_t i = 0; i < now.track_ids.size(); ++i) {
     of_track[now.track_ids[i]] = -influences_.of_point[i];
@@ -110,25 +107,16 @@ void MotionCovariance::localized(const Window& window,
   }
 }
 
-void MotionCovariance::adjusted(const Window& window,
-                                const Observations& points,
-                                const Rigid3& world_from_camera,
-                                const Rigid3& world_from_prev,
-                                const Camera& camera,
-                                double loss_px) {
+void MotionCovariance::adjusted(const InMap& at) {
   if (!is_prev_localized_) {
     return;
   }
   const auto sum_at = [&](const Observations& seen, const Rigid3& pose) {
-    Vector6d sum = Vector6d::Zero();
-    for (const Vector6d& influence :
-         influences_at(find_seen_landmarks(window, seen), pose, camera, loss_px).of_point) {
-      sum += influence;
-    }
-    return sum;
+    const PoseInfluences of = influences_of(find_seen_landmarks(at.window, seen), pose, at);
+    return std::accumulate(of.of_point.begin(), of.of_point.end(), Vector6d::Zero().eval());
   };
-  const Matrix6d to_cur = adjoint(world_from_camera.inverse() * world_from_prev);
-  step_ = to_cur * sum_at(prev_points_, world_from_prev) - sum_at(points, world_from_camera);
+  const Matrix6d to_cur = adjoint(at.world_from_camera.inverse() * at.world_from_prev);
+  step_ = to_cur * sum_at(prev_points_, at.world_from_prev) - sum_at(points_, at.world_from_camera);
 }
 
 Matrix6d MotionCovariance::finish(const Motion& motion) {

@@ -3,10 +3,7 @@
 
 #include <optional>
 
-#include <Eigen/Core>
-
 #include "geometry/pose_influence.hpp"
-#include "odometry/localization.hpp"
 #include "odometry/motion_model.hpp"
 #include "odometry/window.hpp"
 #include "stemvo/camera.hpp"
@@ -50,19 +47,17 @@ class MotionCovariance {
     std::optional<double> scale_sigma;  ///< nullopt: the path is in units
   };
 
-  /// A frame in the map, before its keyframe changes that; and after, where it did.
-  void localized(const Window& window,
-                 const Observations& points,
-                 const Rigid3& world_from_camera,
-                 const Rigid3& world_from_prev,
-                 const Camera& camera,
-                 double loss_px);
-  void adjusted(const Window& window,
-                const Observations& points,
-                const Rigid3& world_from_camera,
-                const Rigid3& world_from_prev,
-                const Camera& camera,
-                double loss_px);
+  /// A frame and the one before in the map.
+  struct InMap {
+    const Window& window;
+    const Rigid3& world_from_camera;
+    const Rigid3& world_from_prev;
+    const Camera& camera;
+    double loss_px;
+  };
+  /// Before the frame's keyframe changes the map; and after, where it did.
+  void localized(const InMap& at, const Observations& points);
+  void adjusted(const InMap& at);
 
   /// Last, for every frame. Finite, symmetric, positive definite; zero up to the first one seen.
   [[nodiscard]] Matrix6d finish(const Motion& motion);

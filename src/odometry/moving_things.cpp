@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/moving_things.hpp"
 
-#include <algorithm>
-#include <cstddef>
 #include <functional>
 #include <iterator>
 #include <limits>
-#include <map>
-#include <optional>
 #include <utility>
 
 #include "geometry/two_view_models.hpp"
@@ -160,7 +156,7 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
 }
 
 void MovingTracks::add(const Matches& matches, const std::vector<char>& moving_mask) {
-  for (const int track_id : select<int>(matches.track_ids, moving_mask)) {
+  for (const int track_id : select(matches.track_ids, moving_mask)) {
     evidence_.emplace(track_id, kFirstEvidence);
   }
 }
@@ -170,10 +166,8 @@ void MovingTracks::observe(const Matches& matches, const std::vector<char>& fits
     return;
   }
   const std::vector<char> moving = flags(matches);
-  const std::optional<Eigen::Matrix3d> motion =
-      estimate_homography({select<Eigen::Vector2d>(matches.prev_uv, moving),
-                           select<Eigen::Vector2d>(matches.cur_uv, moving)},
-                          options_, seed_);
+  const std::optional<Eigen::Matrix3d> motion = estimate_homography(
+      {select(matches.prev_uv, moving), select(matches.cur_uv, moving)}, options_, seed_);
   std::map<int, int> before = std::exchange(evidence_, {});
   if (!motion.has_value()) {
     return;

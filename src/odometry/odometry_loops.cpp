@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/odometry_loops.hpp"
 
-#include <utility>
-
 namespace stemvo {
 
 FrameLoops::FrameLoops(FrameStages stages, int num_threads) : stages_(std::move(stages)) {

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/phased_odometry.hpp"
 
-#include <utility>
-
-#include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
 #include "internal_check.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/robust_models.hpp"
 
+#include <algorithm>
 #include <vector>
 
 #include <opencv2/calib3d.hpp>
@@ -17,11 +18,9 @@ constexpr double kPoseConfidence = 0.9999;
 constexpr int kPoseIterations = 1000;
 
 std::vector<cv::Point2d> to_points(std::span<const Eigen::Vector2d> uv) {
-  std::vector<cv::Point2d> points;
-  points.reserve(uv.size());
-  for (const Eigen::Vector2d& point : uv) {
-    points.emplace_back(point.x(), point.y());
-  }
+  std::vector<cv::Point2d> points(uv.size());
+  std::ranges::transform(uv, points.begin(),
+                         [](const auto& point) { return cv::Point2d(point.x(), point.y()); });
   return points;
 }
 
@@ -140,9 +139,6 @@ std::optional<Rigid3> estimate_absolute_pose(std::span<const Eigen::Vector3d> po
       return std::nullopt;
     }
   } catch (const cv::Exception&) {
-    return std::nullopt;
-  }
-  if (rotation.total() != 3 || translation.total() != 3) {
     return std::nullopt;
   }
   Eigen::Vector3d w;

@@ -2,7 +2,6 @@
 #include "odometry/scale_filter.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace stemvo {
 

@@ -47,16 +47,11 @@ bool is_plausible(const CameraMeasurement& found) {
 }  // namespace
 
 std::optional<IntrinsicsDelta> prior_sigma(CameraRefinement refinement) {
-  using Sigma = Eigen::Map<const IntrinsicsDelta>;
-  switch (refinement) {
-    case CameraRefinement::kOff:
-      return std::nullopt;
-    case CameraRefinement::kPrincipalPoint:
-      return Sigma(kPriorSigma);
-    case CameraRefinement::kAll:
-      return Sigma(kWeakPriorSigma);
+  if (refinement == CameraRefinement::kOff) {
+    return std::nullopt;
   }
-  return std::nullopt;
+  return Eigen::Map<const IntrinsicsDelta>(refinement == CameraRefinement::kAll ? kWeakPriorSigma
+                                                                                : kPriorSigma);
 }
 
 SelfCalibration::SelfCalibration(const Camera& given,

@@ -11,12 +11,6 @@
 namespace stemvo {
 namespace {
 
-void sort_by_id(Observations& points) {
-  if (!std::ranges::is_sorted(points, {}, &Observation::track_id)) {
-    std::ranges::sort(points, {}, &Observation::track_id);
-  }
-}
-
 Observations kept_points(const std::vector<int>& track_ids,
                          const std::vector<Eigen::Vector2d>& uv,
                          const std::vector<char>& is_kept) {
@@ -27,7 +21,7 @@ Observations kept_points(const std::vector<int>& track_ids,
       points.push_back({track_ids[i], uv[i]});
     }
   }
-  sort_by_id(points);
+  std::ranges::sort(points, {}, &Observation::track_id);
   return points;
 }
 
@@ -69,25 +63,18 @@ void add_begun_points(const Matches& matches,
     return find_point(points, point.track_id) != nullptr;
   });
   points.insert(points.end(), begun.begin(), begun.end());
-  sort_by_id(points);
+  std::ranges::sort(points, {}, &Observation::track_id);
 }
 
 const Observation* find_point(const Observations& points, int track_id) {
-  if (points.empty() || track_id < points.front().track_id || track_id > points.back().track_id) {
-    return nullptr;  // most are: tracks are young or old
-  }
   const auto found = std::ranges::lower_bound(points, track_id, {}, &Observation::track_id);
   return found != points.end() && found->track_id == track_id ? &*found : nullptr;
 }
 
-PointPairs common_points(const Observations& prev, const Observations& cur) {
-  PointPairs pairs;
-  auto other = prev.begin();
+Matches common_points(const Observations& prev, const Observations& cur) {
+  Matches pairs;
   for (const Observation& point : cur) {
-    while (other != prev.end() && other->track_id < point.track_id) {
-      ++other;
-    }
-    if (other != prev.end() && other->track_id == point.track_id) {
+    if (const Observation* other = find_point(prev, point.track_id)) {
       pairs.track_ids.push_back(point.track_id);
       pairs.prev_uv.push_back(other->uv);
       pairs.cur_uv.push_back(point.uv);
@@ -105,7 +92,7 @@ std::optional<double> stationary_flow_px(const Observations& before,
                                          const Observations& now,
                                          double min_flow_px,
                                          int min_tracks) {
-  const PointPairs pairs = common_points(before, now);
+  const Matches pairs = common_points(before, now);
   std::vector<char> stays(pairs.prev_uv.size());
   std::vector<double> flows_px;
   for (std::size_t i = 0; i < stays.size(); ++i) {
@@ -116,8 +103,9 @@ std::optional<double> stationary_flow_px(const Observations& before,
     }
   }
   const std::vector<char> all(stays.size(), 1);
-  const bool is_stationary = pairs.size() >= min_tracks && 2.0 * cell_votes(pairs.prev_uv, stays) >
-                                                               cell_votes(pairs.prev_uv, all);
+  const bool is_stationary =
+      std::ssize(stays) >= min_tracks &&
+      2.0 * cell_votes(pairs.prev_uv, stays) > cell_votes(pairs.prev_uv, all);
   return is_stationary ? std::optional(median(std::move(flows_px))) : std::nullopt;
 }
 
@@ -140,9 +128,6 @@ double rms_parallax_px(const Eigen::Quaterniond& rotation,
 double median_epipolar_px(const Rigid3& cur_from_prev,
                           const PixelPairs& pairs,
                           const Camera& camera) {
-  if (!(cur_from_prev.translation.norm() > 0.0)) {
-    return 0.0;
-  }
   const Eigen::Matrix3d fundamental = fundamental_of(cur_from_prev, camera);
   return median(lengths_of(pairs, [&](const Eigen::Vector2d& prev, const Eigen::Vector2d& cur) {
     const Eigen::Vector3d line_in_cur = fundamental * prev.homogeneous();

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -30,19 +29,12 @@ void add_begun_points(const Matches& matches,
 [[nodiscard]] const Observation* find_point(const Observations& points, int track_id);
 
 /// Tracks that two frames share.
-struct PointPairs {
-  std::vector<int> track_ids;
-  std::vector<Eigen::Vector2d> prev_uv;
-  std::vector<Eigen::Vector2d> cur_uv;
-
-  [[nodiscard]] int size() const { return static_cast<int>(track_ids.size()); }
-};
-[[nodiscard]] PointPairs common_points(const Observations& prev, const Observations& cur);
+[[nodiscard]] Matches common_points(const Observations& prev, const Observations& cur);
 
 /// The values that the mask keeps.
-template <typename T>
-[[nodiscard]] std::vector<T> select(std::span<const T> values, const std::vector<char>& mask) {
-  std::vector<T> selected;
+template <typename List>
+[[nodiscard]] auto select(const List& values, const std::vector<char>& mask) {
+  std::vector<typename List::value_type> selected;
   selected.reserve(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (mask[i] != 0) {

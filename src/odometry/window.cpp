@@ -3,14 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <iterator>
 #include <limits>
 #include <numbers>
-#include <optional>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include "geometry/median.hpp"
 #include "geometry/triangulation.hpp"
@@ -106,10 +102,9 @@ void add_landmarks(const Window& window, int num_fixed_poses, bool are_fixed, Wi
     }
     const std::span<const KeyframeObservation> observations = walk.seek(track_id);
     const bool is_in_front =
-        std::all_of(observations.begin(), observations.end(),
-                    [&, &at = point](const KeyframeObservation& observation) {
-                      return (bundle.camera_from_world[observation.keyframe] * at).z() > kMinDepth;
-                    });
+        std::ranges::all_of(observations, [&, &at = point](const KeyframeObservation& observation) {
+          return (bundle.camera_from_world[observation.keyframe] * at).z() > kMinDepth;
+        });
     const bool moves_a_pose =
         !observations.empty() && static_cast<int>(observations.back().keyframe) >= num_fixed_poses;
     if (observations.size() < min_observations || !is_in_front || !moves_a_pose) {
@@ -128,10 +123,8 @@ WindowBundle read_window(const Window& window, const Camera& camera, int num_fix
   WindowBundle read;
   read.bundle.camera = camera;
   read.bundle.camera_from_world = poses_of(window);
-  if (!window.fixed.empty()) {
-    add_landmarks(window, num_fixed_poses, true, read);
-    read.bundle.num_fixed_points = static_cast<int>(read.bundle.points.size());
-  }
+  add_landmarks(window, num_fixed_poses, true, read);
+  read.bundle.num_fixed_points = static_cast<int>(read.bundle.points.size());
   add_landmarks(window, num_fixed_poses, false, read);
   return read;
 }
@@ -168,11 +161,9 @@ void write_back(const WindowBundle& refined, Window& window, int num_fixed) {
 }  // namespace
 
 std::vector<Rigid3> poses_of(const Window& window) {
-  std::vector<Rigid3> poses;
-  poses.reserve(window.keyframes.size());
-  for (const Keyframe& keyframe : window.keyframes) {
-    poses.push_back(keyframe.world_from_camera.inverse());
-  }
+  std::vector<Rigid3> poses(window.keyframes.size());
+  std::ranges::transform(window.keyframes, poses.begin(), &Rigid3::inverse,
+                         &Keyframe::world_from_camera);
   return poses;
 }
 
@@ -238,9 +229,6 @@ void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& option
 }
 
 void triangulate_landmarks(Window& window, const Camera& camera, const WindowOptions& options) {
-  if (window.keyframes.size() < 2) {
-    return;
-  }
   const std::vector<Rigid3> poses = poses_of(window);
   const std::vector<char> have_way =
       have_known_way(window, options.min_way_deg * std::numbers::pi / 180.0);

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/window_estimator.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <iterator>
 #include <utility>
 
@@ -311,8 +309,7 @@ void WindowEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
     }
   }
   if (is_localized(frame)) {
-    uncertainty_.localized(window_, view_.points, world_from_camera_, trajectory_.back(), camera(),
-                           localization_.loss_px);
+    uncertainty_.localized(in_map(), view_.points);
     if (result.state == FrameState::kTracking && is_keyframe(view_)) {
       timed(Stage::kWindowRefinement, [&] { add_keyframe(frame); });
     }
@@ -329,8 +326,9 @@ bool WindowEstimator::is_keyframe(const View& view) const {
   if (newest.frame == view.frame) {
     return false;
   }
-  const PointPairs pairs = common_points(newest.points, view.points);
-  if (static_cast<double>(pairs.size()) < kMinOverlap * static_cast<double>(newest.points.size())) {
+  const Matches pairs = common_points(newest.points, view.points);
+  if (static_cast<double>(pairs.cur_uv.size()) <
+      kMinOverlap * static_cast<double>(newest.points.size())) {
     return true;
   }
   const int num_landmarks = find_seen_landmarks(window_, view.points).size();
@@ -351,7 +349,7 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
     history_.leave(window_, leaving, keyframe);
   }
   stemvo::add_keyframe(window_, std::move(keyframe), window_options_);
-  drop_landmarks(window_, select<int>(frame.matches.track_ids, moving_.flags(frame.matches)));
+  drop_landmarks(window_, select(frame.matches.track_ids, moving_.flags(frame.matches)));
   triangulate_landmarks(window_, camera(), window_options_);
   if (refine_every_ > 0 && ++keyframes_since_refinement_ >= refine_every_) {
     keyframes_since_refinement_ = 0;
@@ -362,8 +360,7 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
     view_.world_from_camera = world_from_camera_;
   }
   cull_landmarks(window_, camera(), window_options_);
-  uncertainty_.adjusted(window_, view_.points, world_from_camera_, trajectory_.back(), camera(),
-                        localization_.loss_px);
+  uncertainty_.adjusted(in_map());
   // The newest keyframe but one: it has its new corners.
   const Keyframe& complete = *std::prev(window_.keyframes.end(), 2);
   calibration_.observe(complete, radials_[static_cast<std::size_t>(complete.frame)], refinement_);

@@ -142,6 +142,9 @@ class WindowEstimator final : public Estimator {
     return {window_,     history_, camera(),      radials_,
             trajectory_, times_s_, metric_sigma_, view_.frame};
   }
+  [[nodiscard]] MotionCovariance::InMap in_map() const {
+    return {window_, world_from_camera_, trajectory_.back(), camera(), localization_.loss_px};
+  }
   /// The camera in use: SelfCalibration owns it, everything else takes it as an argument.
   [[nodiscard]] const Camera& camera() const { return calibration_.camera(); }
   /// Least flow that counts as motion.

@@ -72,9 +72,9 @@ std::vector<char> are_near(const Window& window, const SeenLandmarks& seen, cons
 double WindowEstimator::share_that_fits(const Rigid3& cur_from_last,
                                         const Matches& matches,
                                         const std::vector<char>& mask) const {
-  const auto cur = select<Eigen::Vector2d>(matches.cur_uv, mask);
-  const std::vector<char> fits = epipolar_inliers(
-      cur_from_last, {select<Eigen::Vector2d>(matches.prev_uv, mask), cur}, camera(), kFits_px);
+  const auto cur = select(matches.cur_uv, mask);
+  const std::vector<char> fits =
+      epipolar_inliers(cur_from_last, {select(matches.prev_uv, mask), cur}, camera(), kFits_px);
   return cell_votes(cur, fits) / cell_votes(cur, std::vector<char>(fits.size(), 1));
 }
 
@@ -86,10 +86,8 @@ std::optional<Localization> WindowEstimator::localize_by_rest(const Rigid3& foun
   if (fitting > kMinFitting) {
     return std::nullopt;
   }
-  const MeasuredMotion motion =
-      initializer_.measure_world({select<Eigen::Vector2d>(matches.prev_uv, mask),
-                                  select<Eigen::Vector2d>(matches.cur_uv, mask)},
-                                 camera());
+  const MeasuredMotion motion = initializer_.measure_world(
+      {select(matches.prev_uv, mask), select(matches.cur_uv, mask)}, camera());
   thing = scatter(motion.moving_mask, mask);
   const std::vector<char> rest = without(thing, mask);
   const auto fits = [&](const std::vector<char>& party) {
@@ -116,10 +114,7 @@ std::optional<Localization> WindowEstimator::localize_by_near(const SeenLandmark
       all_votes - cell_votes(seen.uv, is_near) < kMinFar * all_votes) {
     return std::nullopt;
   }
-  const auto world = stemvo::localize(
-      {select<Eigen::Vector3d>(seen.points, is_near), select<Eigen::Vector2d>(seen.uv, is_near),
-       select<int>(seen.track_ids, is_near)},
-      found, camera(), localization_);
+  const auto world = stemvo::localize(select(seen, is_near), found, camera(), localization_);
   if (!world.has_value()) {
     return std::nullopt;
   }
@@ -127,7 +122,7 @@ std::optional<Localization> WindowEstimator::localize_by_near(const SeenLandmark
     return (world->world_from_camera.translation - from.translation).norm();
   };
   const auto near_px = [&](const std::vector<double>& errors_px) {
-    return median(select<double>(errors_px, is_near));
+    return median(select(errors_px, is_near));
   };
   const std::vector<double> errors_px = distances_px(seen, world->world_from_camera, camera());
   if (way(found) > kMaxShift * way(last_.world_from_camera) &&
@@ -140,11 +135,11 @@ std::optional<Localization> WindowEstimator::localize_by_near(const SeenLandmark
   std::ranges::transform(errors_px, is_far, is_off.begin(), [&](double error_px, char far) {
     return static_cast<char>(far != 0 && error_px > bound_px);
   });
-  if (median(select<double>(errors_px, is_far)) < bound_px ||
+  if (median(select(errors_px, is_far)) < bound_px ||
       cell_votes(seen.uv, is_off) < kMinFar * all_votes) {
     return std::nullopt;
   }
-  const std::vector<int> off = select<int>(seen.track_ids, is_off);
+  const std::vector<int> off = select(seen.track_ids, is_off);
   std::ranges::transform(matches.track_ids, thing.begin(), [&](int track_id) {
     return static_cast<char>(std::ranges::binary_search(off, track_id));
   });

@@ -93,19 +93,4 @@ void keep_first(Status& first, Status next);
 /// Writes all results but pictures; `report` becomes what metrics.json holds.
 [[nodiscard]] Status write_results(const Run& run, const Drive& drive, MetricsReport& report);
 
-struct MapResult {
-  WholeMap whole;
-  Trajectory trajectory;                              ///< of all frames, as result files hold it
-  std::optional<double> adjustment_s = std::nullopt;  ///< it took
-};
-
-/// Adjusted where places were seen again, or where that is asked for; with
-/// scale.source=ground_truth steps get their true length.
-[[nodiscard]] MapResult finish_map(const Run& run);
-
-[[nodiscard]] std::vector<std::pair<std::size_t, std::size_t>> loops_of(const KeptMap& map);
-
-/// map.ply: landmarks and the camera's path among them. Where steps are rescaled, both are.
-[[nodiscard]] Status write_map_ply(const Run& run, const MapResult& map);
-
 }  // namespace stemvo::pipeline

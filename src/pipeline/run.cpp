@@ -5,7 +5,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <opencv2/core/utility.hpp>
 
 #include "dataset/frame_files.hpp"
 #include "mapping/map_file.hpp"

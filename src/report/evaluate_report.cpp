@@ -32,7 +32,7 @@ double motion_error_percent(Trajectory estimate, std::span<const Rigid3> ground_
   for (Rigid3& pose : estimate) {
     pose.translation *= scale;
   }
-  const std::vector<double> errors = dense_errors(estimate, ground_truth, kMaxSegments).t_percent;
+  const std::vector<double> errors = dense_errors({estimate, ground_truth}, kMaxSegments).t_percent;
   return std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
 }
 
@@ -157,12 +157,12 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
     if (compared.size() < 2) {
       return fail(file.string() + ": expected at least 2 poses, for motions are compared, found 1");
     }
-    report.rows.push_back({file.string(), evaluate_aligned(compared, with, request.alignment),
+    report.rows.push_back({file.string(), evaluate_aligned({compared, with}, request.alignment),
                            estimate.poses.size(), compared.size(),
                            other_convention(compared, with)});
   }
   // No alignment: a fit would move the whole heap of points into the middle of the drive.
-  report.zero_motion = {"(zero motion)", evaluate(Trajectory(truth.poses.size()), truth.poses),
+  report.zero_motion = {"(zero motion)", evaluate({Trajectory(truth.poses.size()), truth.poses}),
                         truth.poses.size(), truth.poses.size()};
   return report;
 }

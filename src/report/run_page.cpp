@@ -16,7 +16,7 @@ Json segments_json(const RunPage& run) {
   Json lists = {
       {"length_m", Json::array()}, {"t_percent", Json::array()}, {"r_deg_per_100m", Json::array()}};
   for (const SegmentError& error :
-       segment_errors(take_poses(run.plot.estimate, frames), truth,
+       segment_errors({take_poses(run.plot.estimate, frames), truth},
                       run.report.metrics->segment_lengths_m, kFirstFrameStep)) {
     lists["length_m"].push_back(error.length_m);
     lists["t_percent"].push_back(error.t_percent);

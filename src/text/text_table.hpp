@@ -13,7 +13,7 @@ class TextTable {
   /// One character per column: 'l' left, 'r' right.
   explicit TextTable(std::string alignment) : alignment_(std::move(alignment)) {}
 
-  /// At most as many cells as columns (checked).
+  /// At most as many cells as columns.
   void add(std::vector<std::string> cells);
   void rule() { rows_.emplace_back(); }
   [[nodiscard]] std::string str() const;

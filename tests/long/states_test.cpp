@@ -89,7 +89,7 @@ TEST(Walk, ACameraInTheHandIsFollowed) {
   }
   ASSERT_LT(begin, 60U);
   const std::span<const Rigid3> online = std::span(result.poses).subspan(begin);
-  EXPECT_LE(evaluate(online, std::span(*truth).subspan(begin)).ate_rmse.sim3_m, 0.01 * path_m);
+  EXPECT_LE(evaluate({online, std::span(*truth).subspan(begin)}).ate_rmse.sim3_m, 0.01 * path_m);
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ class Times : public NeedsClips {
       truth.push_back(clip_->ground_truth->poses[given.index]);
       outcome.inliers += frame.num_inliers / static_cast<double>(frames.size());
     }
-    const Metrics metrics = evaluate(rescale_steps(estimate, truth), truth, {});
+    const Metrics metrics = evaluate({rescale_steps({estimate, truth}), truth});
     outcome.t_rel_percent = metrics.t_rel_percent.value();
     std::cout << "t_rel " << outcome.t_rel_percent << " %, inliers " << outcome.inliers << "\n";
     return outcome;

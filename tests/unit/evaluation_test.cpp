@@ -29,7 +29,7 @@ Trajectory circle(int num_poses, double yaw_rad) {
 // A segment of nominally L metres ends at the first frame beyond L: L + 1 m with steps of 1 m. 1 %
 // too long a step is an error of 0.01 (L + 1) m over L m.
 TEST(Evaluate, OnePercentOfScaleIsOnePercentOfTranslation) {
-  const Metrics metrics = evaluate(straight(1001, 1.01), straight(1001, 1.0));
+  const Metrics metrics = evaluate({straight(1001, 1.01), straight(1001, 1.0)});
   double sum = 0.0;
   int count = 0;
   for (int length = 100; length <= 800; length += 100) {
@@ -56,7 +56,7 @@ TEST(Evaluate, OnePercentOfScaleIsOnePercentOfTranslation) {
 // Straight ahead in truth, 0.01 deg of yaw per metre in the estimate: 1 deg per 100 m, and again
 // the segment is one metre longer than its name.
 TEST(Evaluate, ConstantYawErrorIsItsRotationPerHundredMetres) {
-  const Metrics metrics = evaluate(circle(151, 0.01 * kDeg), circle(151, 0.0));
+  const Metrics metrics = evaluate({circle(151, 0.01 * kDeg), circle(151, 0.0)});
   EXPECT_EQ(metrics.num_segments, 5);  // 100 m, starting at 0, 10, .. 40
   EXPECT_NEAR(metrics.r_rel_deg_per_100m.value(), 1.01, 1e-9);
   EXPECT_NEAR(metrics.rpe_rotation_deg, 0.01, 1e-9);
@@ -70,29 +70,29 @@ TEST(Evaluate, LookingElsewhereAtTheRightPlaceCostsNoTranslation) {
   for (std::size_t i = 1; i < estimate.size(); ++i) {
     estimate[i].rotation = so3_exp({0.0, 10.0 * kDeg, 0.0});
   }
-  const Metrics metrics = evaluate(estimate, straight(106, 1.0));
+  const Metrics metrics = evaluate({estimate, straight(106, 1.0)});
   EXPECT_EQ(metrics.num_segments, 1);
   EXPECT_NEAR(metrics.t_rel_percent.value(), 0.0, 1e-9);
   EXPECT_NEAR(metrics.r_rel_deg_per_100m.value(), 10.0, 1e-9);
 }
 
 TEST(Evaluate, PathsUnderHundredMetresTakeShortSegments) {
-  const Metrics metrics = evaluate(straight(61, 0.98), straight(61, 1.0));
+  const Metrics metrics = evaluate({straight(61, 0.98), straight(61, 1.0)});
   EXPECT_THAT(metrics.segment_lengths_m, ::testing::ElementsAre(10, 20, 30, 40, 50));
   EXPECT_NEAR(metrics.t_rel_percent.value(), 2.0, 0.2);
-  EXPECT_EQ(evaluate(straight(101, 1.0), straight(101, 1.0)).segment_lengths_m.front(), 100.0);
+  EXPECT_EQ(evaluate({straight(101, 1.0), straight(101, 1.0)}).segment_lengths_m.front(), 100.0);
 }
 
 TEST(Evaluate, SegmentLengthsAskedForAreTaken) {
   EvaluationOptions options{.segment_lengths_m = {25.0}};
-  const Metrics metrics = evaluate(straight(41, 1.0), straight(41, 1.0), options);
+  const Metrics metrics = evaluate({straight(41, 1.0), straight(41, 1.0)}, options);
   EXPECT_THAT(metrics.segment_lengths_m, ::testing::ElementsAre(25));
   EXPECT_EQ(metrics.num_segments, 2);  // 0 -> 26, 10 -> 36
 }
 
 TEST(Evaluate, NoSegmentFitsMeansNoNumber) {
   for (const int num_poses : {1, 2, 5}) {
-    const Metrics metrics = evaluate(straight(num_poses, 1.0), straight(num_poses, 1.0));
+    const Metrics metrics = evaluate({straight(num_poses, 1.0), straight(num_poses, 1.0)});
     EXPECT_FALSE(metrics.t_rel_percent.has_value()) << num_poses;
     EXPECT_FALSE(metrics.r_rel_deg_per_100m.has_value()) << num_poses;
     EXPECT_EQ(metrics.num_segments, 0);
@@ -104,7 +104,7 @@ TEST(Evaluate, OffsetTakesXAndZAndLeavesHeightOut) {
   Trajectory truth(2);
   Trajectory estimate(2);
   estimate[1].translation = {3.0, 100.0, -5.0};
-  EXPECT_NEAR(evaluate(estimate, truth).average_offset_m, (3.0 + 5.0) / 2.0, 1e-12);
+  EXPECT_NEAR(evaluate({estimate, truth}).average_offset_m, (3.0 + 5.0) / 2.0, 1e-12);
 }
 
 TEST(AlignTrajectory, UndoesAPlantedSimilarity) {
@@ -138,8 +138,8 @@ Trajectory shared_poses(const std::string& name) {
 // Published: stereo ORB-SLAM2 has 0.70 % and 0.25 deg per 100 m on sequence 00 with the devkit.
 TEST(EvaluateOnSharedData, StereoOrbSlam2OnSequence00ScoresAsPublished) {
   STEMVO_NEEDS_SHARED_DATA();
-  const Metrics metrics =
-      evaluate(shared_poses("peers/orbslam2_stereo_lc/00.txt"), shared_poses("full_poses/00.txt"));
+  const Metrics metrics = evaluate(
+      {shared_poses("peers/orbslam2_stereo_lc/00.txt"), shared_poses("full_poses/00.txt")});
   EXPECT_NEAR(metrics.t_rel_percent.value(), 0.71, 0.005);
   EXPECT_NEAR(metrics.r_rel_deg_per_100m.value(), 0.255, 0.0005);
   EXPECT_NEAR(metrics.path_length_m, 3724.0, 1.0);

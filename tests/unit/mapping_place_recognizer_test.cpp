@@ -50,7 +50,7 @@ struct TwoRounds {
     }
     ++num_lookups;
     components.resize(map.keyframes.size(), component);
-    const auto loop = recognizer.recognize(map, components, number, keyframe, describe_as);
+    const auto loop = recognizer.recognize({map, components, number, keyframe}, describe_as);
     if (!recognizer.shows_kept_place()) {
       recognizer.add(number, keyframe);
       ++num_places;

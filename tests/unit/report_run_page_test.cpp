@@ -27,7 +27,7 @@ class RunPageTest : public ::testing::Test {
       estimate_.push_back(pose);
     }
     report_.num_frames = estimate_.size();
-    report_.metrics = evaluate(estimate_, truth_->poses);
+    report_.metrics = evaluate({estimate_, truth_->poses});
   }
 
   json content() {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
@@ -114,9 +115,7 @@ cv::Matx33d strip_homography(const Camera& camera, const Strip& strip, const Roa
   const Eigen::Matrix3d h =
       k * (warp.rotation() + warp.translation * warp.plane.transpose()) * k.inverse();
   cv::Matx33d map;
-  for (int i = 0; i < 9; ++i) {
-    map(i / 3, i % 3) = h(i / 3, i % 3);
-  }
+  cv::eigen2cv(h, map);
   return map * cv::Matx33d(1, 0, strip.box.x, 0, 1, strip.box.y, 0, 0, 1);
 }
 

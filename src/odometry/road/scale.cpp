@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/road/scale.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <utility>
 
 #include <Eigen/LU>
 
