@@ -250,6 +250,20 @@ TEST(MotionModel, APushIsFollowed) {
   EXPECT_LT(camera.error(), 0.004);
 }
 
+// As sure as the measurement: half way, and half the covariance. What the turn shares goes along.
+TEST(MotionModel, AHoldCountsByItsSigma) {
+  Matrix6d noise = 0.04 * Matrix6d::Identity();
+  noise(0, 4) = noise(4, 0) = 0.02;
+  const Rigid3 measured(Eigen::Quaterniond::Identity(), {0.1, 0.0, 0.0});
+  const MotionModel::Fused fused = MotionModel().fuse(measured, noise, /*weight=*/0.0, 0.1,
+                                                      MotionModel::Hold{{0.0, 0.0, 0.0}, 0.2});
+  EXPECT_NEAR(fused.prev_from_cur.translation.x(), 0.05, 1e-9);
+  EXPECT_NEAR(so3_log(fused.prev_from_cur.rotation).y(), -0.025, 1e-9);
+  const Matrix6d covariance = fused.gain * noise * fused.gain.transpose() + fused.rest;
+  EXPECT_NEAR(covariance(0, 0), 0.02, 1e-12);
+  EXPECT_NEAR(covariance(4, 4), 0.04 - 0.02 * 0.02 / 0.08, 1e-12);
+}
+
 TEST(MotionModel, KeepsToTheUnitOfTheMap) {
   MotionModel one;
   MotionModel other;
