@@ -1,4 +1,4 @@
-# Sources of one folder are compiled together, eight at a time: headers and templates are paid for once. Off in the preset `dev`, where one file is changed often, and for clang-tidy.
+# Sources of one folder are compiled together, eight at a time: headers and templates are paid for once. Off in the preset `dev`, where one file is changed often, and for clang-tidy over single files.
 option(STEMVO_UNITY_BUILD "Compile sources of one folder together" ON)
 
 # Called when the target has all its sources.
