@@ -153,6 +153,9 @@ nb::dict errors_by_segment(const GivenArray& estimate,
 nb::dict dense_errors_of(const GivenArray& estimate,
                          const GivenArray& truth,
                          std::size_t max_segments) {
+  if (max_segments == 0) {
+    throw nb::value_error("max_segments: expected at least 1, found 0");
+  }
   const TrajectoryPair pair = pair_of(estimate, truth);
   const DenseErrors errors = [&] {
     const nb::gil_scoped_release release;

@@ -23,8 +23,10 @@ constexpr double kMinLandmarkShare = 0.3;
 constexpr double kMinExplained = 0.5;
 /// A camera that was still is believed to move from so many times the flow on.
 constexpr double kHysteresis = 1.5;
-/// Tracks that do not move are right to so much.
-constexpr double kHiddenFlow_px = 0.05;
+/// Tracks that do not move are right to so much ..
+constexpr double kTracksNoise_px = 0.05;
+/// .. and a motion along the optical axis moves them less than one to the side.
+constexpr double kHides = 2.0;
 /// So many times the flow of a stationary frame is what errors of landmarks do to one that turns.
 constexpr double kTurnFlow = 3.0;
 /// Who stood is believed to stand for so long where things that pass hide the world.
@@ -70,7 +72,7 @@ LocalizedFrame WindowEstimator::localize(const Frame& frame) {
   result.num_matches = static_cast<int>(mask.size());
   result.num_inliers = static_cast<int>(std::count(mask.begin(), mask.end(), char{1}));
   if (frame.has_image() && !is_initializing_) {
-    const Observations& seen = result.state == FrameState::kLost ? Observations() : view_.points;
+    const Observations& seen = is_localized(frame) ? view_.points : Observations();
     localized.projections = project_lost_landmarks(window_, world_from_camera_, seen, camera());
     localized.may_be_hidden = stood_;
   }
@@ -109,6 +111,7 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
     return accept_localization(frame, of_world, still_px, localized);
   }
   if (still_px) {  // few landmarks, but nothing moves
+    stood_ = true;
     return FrameState::kStationary;
   }
   if (relocate(frame, now, start)) {
@@ -139,18 +142,20 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
   Observations now = current_points(frame.matches, localized.inlier_mask);
   const SeenLandmarks seen = find_seen_landmarks(window_, now);
   const double bound_px = min_way_px();
-  double parallax_px = is_last_localized_ ? parallax_since_px(moved_to_, found, seen, camera(),
-                                                              localization_.inlier_bound_px)
-                                                .value_or(bound_px)
-                                          : bound_px;
-  if (still_px) {  // more is an error of the landmarks: few, or all of them far
+  const std::optional<double> measured_px =
+      is_last_localized_ || still_px
+          ? parallax_since_px(moved_to_, found, seen, camera(), localization_.inlier_bound_px)
+          : std::nullopt;
+  double parallax_px = measured_px.value_or(bound_px);
+  const bool is_held = still_px && measured_px;  // fewer landmarks give the pose no covariance
+  if (is_held) {  // more is an error of the landmarks: few, or all of them far
     parallax_px = std::min(parallax_px, min_flow_px());
   }
   const bool has_moved = parallax_px >= bound_px;
   if (has_moved) {
     moved_to_ = found.translation;
   } else if (last_.frame == frame.number - 1) {
-    fuse_with_prediction(before, seen, parallax_px / bound_px, still_px);
+    fuse_with_prediction(before, seen, parallax_px / bound_px, is_held ? still_px : std::nullopt);
   }
   const double turn_px =
       camera().mean_focal_px() * view_.world_from_camera.rotation.angularDistance(found.rotation);
@@ -194,7 +199,7 @@ void WindowEstimator::fuse_with_prediction(const Rigid3& before,
   std::optional<MotionModel::Hold> hold;
   if (still_px) {  // what so little flow may hide
     hold = {before.inverse() * moving_view_.world_from_camera.translation,
-            std::max(*still_px, kHiddenFlow_px) * pixel_units(seen)};
+            std::max(*still_px, kTracksNoise_px) * kHides * pixel_units(seen)};
   }
   fused_ = motion_.fuse(before.inverse() * world_from_camera_, noise, weight, interval_s_, hold);
   world_from_camera_ = before * fused_->prev_from_cur;
@@ -290,6 +295,7 @@ bool WindowEstimator::open_window(View view) {
   world_from_camera_ = view.world_from_camera;
   moved_to_ = view.world_from_camera.translation;
   moving_view_ = view;
+  stood_ = false;
   view_ = std::move(view);
   return true;
 }
@@ -358,6 +364,7 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
     refine_window(window_, camera(), refinement_);
     world_from_camera_ = window_.keyframes.back().world_from_camera;
     view_.world_from_camera = world_from_camera_;
+    moving_view_.world_from_camera = world_from_camera_;
   }
   cull_landmarks(window_, camera(), window_options_);
   uncertainty_.adjusted(in_map());
