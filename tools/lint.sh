@@ -17,7 +17,7 @@ cmake --preset dev -B "$BUILD" -D CMAKE_DISABLE_PRECOMPILE_HEADERS=ON -D STEMVO_
   { cat "$BUILD/configure.log" >&2; exit 1; }
 cmake --build "$BUILD" --target stemvo_version >"$BUILD/build.log" || { cat "$BUILD/build.log" >&2; exit 1; } # a generated header
 sources=("$@")
-(($# > 0)) || mapfile -t sources < <(grep -oP '"file": "\K[^"]*/(src|apps)/[^"]*' "$BUILD/compile_commands.json")
+(($# > 0)) || mapfile -t sources < <(grep -oP "\"file\": \"\K$PWD/($BUILD/)?(src|apps)/[^\"]*" "$BUILD/compile_commands.json")
 echo "==> clang-tidy over ${#sources[@]} sources of src and apps"
 failed=0
 # Deprecated functions that libstdc++ itself uses are no finding; nor are counts of warnings in system headers.

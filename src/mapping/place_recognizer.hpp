@@ -42,14 +42,9 @@ class PlaceRecognizer {
   /// some frames ago.
   [[nodiscard]] bool asks(const KeptKeyframe& keyframe) const;
 
-  /// The keyframe, which has landmarks as they are now and a descriptor per corner, is to be the
-  /// map's keyframe `number`. Reads of the map places far before it, and where keyframes are.
-  /// The loop's corners are those of both keyframes as they are given here.
-  /// `components`: of each keyframe of the map the one it belongs to. Where a loop is to join two
-  /// of this recording, more sightings must agree: no motion says where they lie.
   struct Question {
     const KeptMap& map;
-    std::span<const int> components;
+    std::span<const int> components;  ///< of each keyframe of the map the one it belongs to
     int number;
     const KeptKeyframe& keyframe;
 
@@ -59,6 +54,10 @@ class PlaceRecognizer {
              components[static_cast<std::size_t>(number)];
     }
   };
+  /// The keyframe, which has landmarks as they are now and a descriptor per corner, is to be the
+  /// map's keyframe `number`. Reads of the map places far before it, and where keyframes are.
+  /// The loop's corners are those of both keyframes as they are given here. Where a loop is to join
+  /// two maps of this recording, more sightings must agree: no motion says where they lie.
   [[nodiscard]] std::optional<Loop> recognize(const Question& question,
                                               const DescribeAs& describe_as = {});
   /// The last one that was looked up shows a place that is kept: it needs not become one.
