@@ -96,6 +96,9 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   if (!is_initializing_) {
     timer.emplace(Stage::kLocalization);
     still_px = stationary_flow_px(moving_view_.points, now, min_flow_px(), options_.min_inliers);
+    if (!still_px) {
+      keep_stand();
+    }
   }
   const SeenLandmarks seen = find_seen_landmarks(window_, now);
   Rigid3 start = predict();
@@ -112,9 +115,10 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   }
   if (still_px) {  // few landmarks, but nothing moves
     stood_ = true;
+    stand_ = {frame.number, now};
     return FrameState::kStationary;
   }
-  if (relocate(frame, now, start)) {
+  if (standing_keyframe(frame, now) == nullptr && relocate(frame, now, start)) {
     return accept_localization(frame, Rigid3(world_from_camera_), {}, localized);
   }
   if (!is_initializing_ && stood_ && frame.time_s - view_.time_s < kHidden_s) {
@@ -163,6 +167,7 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
   const bool is_nearly_still = !has_moved && turn_px < bound_px;
   stood_ = still_px || (stood_ && is_nearly_still);
   if (still_px) {
+    stand_ = {frame.number, view_.points};
     return FrameState::kStationary;
   }
   moving_view_ = view_;
@@ -213,7 +218,11 @@ FrameState WindowEstimator::measure_since_reference(const Frame& frame,
   const View& reference = initializer_.reference();
   const bool starts_elsewhere =
       reference.points.empty() && frame.matches.prev_frame != reference.frame;
-  if (had_map || starts_elsewhere || initializer_.lost_reference(now)) {
+  const Keyframe* stood = had_map ? standing_keyframe(frame, now) : nullptr;
+  if (stood != nullptr) {
+    reset_reference({stood->frame, stood->world_from_camera, stood->points,
+                     times_s_[static_cast<std::size_t>(stood->frame)], nullptr});
+  } else if (had_map || starts_elsewhere || initializer_.lost_reference(now)) {
     // Where the matches start: the frame before, or the last one before trouble.
     const int first = std::max(frame.matches.prev_frame, 0);
     reset_reference({first,
@@ -251,6 +260,9 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
   const Rigid3 guess =
       reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
   const bool is_tracking = motion.state == FrameState::kTracking;
+  if (is_tracking && motion.is_decisive && go_on_from_stand(frame, motion)) {
+    return FrameState::kTracking;
+  }
   if (is_tracking && motion.is_decisive && !mapper_.may_be_locating() &&
       open_window({frame.number, guess, current_points(frame.matches, motion.inlier_mask),
                    frame.time_s, frame.road})) {
@@ -296,6 +308,7 @@ bool WindowEstimator::open_window(View view) {
   moved_to_ = view.world_from_camera.translation;
   moving_view_ = view;
   stood_ = false;
+  stand_ = {};
   view_ = std::move(view);
   return true;
 }
@@ -346,21 +359,23 @@ bool WindowEstimator::is_keyframe(const View& view) const {
          keyframe_parallax_px_;
 }
 
-void WindowEstimator::add_keyframe(const Frame& frame) {
-  Keyframe keyframe{frame.number, world_from_camera_, view_.points};
-  const auto length = static_cast<std::size_t>(window_options_.num_keyframes);
-  if (window_.keyframes.size() >= length) {
+void WindowEstimator::append(Keyframe keyframe) {
+  if (window_.keyframes.size() >= static_cast<std::size_t>(window_options_.num_keyframes)) {
     const std::size_t leaving = leaving_keyframe(window_, keyframe);
     mapper_.leave(window_view(), leaving);
     history_.leave(window_, leaving, keyframe);
   }
   stemvo::add_keyframe(window_, std::move(keyframe), window_options_);
+}
+
+void WindowEstimator::add_keyframe(const Frame& frame) {
+  append({frame.number, world_from_camera_, view_.points});
   drop_landmarks(window_, select(frame.matches.track_ids, moving_.flags(frame.matches)));
   triangulate_landmarks(window_, camera(), window_options_);
   if (refine_every_ > 0 && ++keyframes_since_refinement_ >= refine_every_) {
     keyframes_since_refinement_ = 0;
-    refinement_.num_fixed_poses =
-        window_.keyframes.size() < length ? 1 : window_options_.num_keyframes / 2;
+    const int length = window_options_.num_keyframes;
+    refinement_.num_fixed_poses = std::ssize(window_.keyframes) < length ? 1 : length / 2;
     refine_window(window_, camera(), refinement_);
     world_from_camera_ = window_.keyframes.back().world_from_camera;
     view_.world_from_camera = world_from_camera_;

@@ -52,6 +52,12 @@ class MapIds {
   std::vector<int> of_frame_;
 };
 
+/// The last frame of a stand, which becomes a keyframe when the camera moves off.
+struct Stand {
+  int frame = -1;       ///< below 0: there was none
+  Observations points;  ///< empty: it is a keyframe
+};
+
 /// The estimator (`odometry.mode: map`): a window of keyframes is the truth, and a frame is
 /// localized against its landmarks. It alone owns pose, window, scale and camera
 /// (docs/architecture.md).
@@ -128,6 +134,12 @@ class WindowEstimator final : public Estimator {
                            const MeasuredMotion& motion,
                            LocalizedFrame& localized);
 
+  // A camera that stood moves off.
+  void keep_stand();
+  [[nodiscard]] const Keyframe* standing_keyframe(const Frame& frame,
+                                                  const Observations& now) const;
+  [[nodiscard]] bool go_on_from_stand(const Frame& frame, const MeasuredMotion& motion);
+
   /// The pose if the last motion goes on. `turned`: its rotation, where that is known.
   [[nodiscard]] Rigid3 predict(const std::optional<Eigen::Quaterniond>& turned = {}) const {
     return world_from_camera_ * motion_.predict(interval_s_, turned);
@@ -157,6 +169,7 @@ class WindowEstimator final : public Estimator {
   // After localization.
   [[nodiscard]] bool is_keyframe(const View& view) const;
   void add_keyframe(const Frame& frame);
+  void append(Keyframe keyframe);
   /// An old place was recognized: the window keeps to it.
   void take_in(const Recognition& recognition);
   /// Units of motion that move the median landmark in view by a pixel.
@@ -194,6 +207,7 @@ class WindowEstimator final : public Estimator {
   View last_;                ///< the last frame with an image, without its points
   View view_;                ///< the last frame that was localized
   View moving_view_;         ///< the last one that was not stationary
+  Stand stand_;
   Eigen::Vector3d moved_to_ = Eigen::Vector3d::Zero();  ///< by the last one with parallax
   Rigid3 road_pose_;                    ///< of the last frame whose road was measured
   bool is_last_localized_ = false;      ///< last_ has a pose that was measured

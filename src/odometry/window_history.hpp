@@ -44,11 +44,15 @@ class WindowHistory {
   void end_frame(const Window& window) {
     ++num_frames_;
     for (const Keyframe& keyframe : window.keyframes) {
-      const bool is_new = scale_of_keyframe_.try_emplace(keyframe.frame, scale_).second;
-      // A new map may begin at a keyframe of the one before.
-      if (is_new && (keyframes_.empty() || keyframe.frame > keyframes_.back())) {
-        keyframes_.push_back(keyframe.frame);
-      }
+      add_keyframe(keyframe.frame);
+    }
+  }
+  /// A frame that has ended is a keyframe, too; its pose is in today's units.
+  void add_keyframe(int frame) {
+    const bool is_new = scale_of_keyframe_.try_emplace(frame, scale_).second;
+    // A new map may begin at a keyframe of the one before.
+    if (is_new && (keyframes_.empty() || frame > keyframes_.back())) {
+      keyframes_.push_back(frame);
     }
   }
   /// The whole window is about to be dropped.

@@ -55,6 +55,7 @@ bool WindowEstimator::relocate(const Frame& frame,
   mapper_.close(window_view());
   mapper_.begin_at_relocation();
   history_.close(window_);
+  stand_ = {};
   map_ids_.go_back_to(found->frame);
   window_ = {};
   window_.keyframes.push_back({frame.number, found->world_from_camera, now});
