@@ -115,7 +115,7 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   }
   if (still_px) {  // few landmarks, but nothing moves
     stood_ = true;
-    stand_ = {frame.number, now};
+    stand_ = {frame.number, now, stand_.keyframe};
     return FrameState::kStationary;
   }
   if (standing_keyframe(frame, now) == nullptr && relocate(frame, now, start)) {
@@ -167,7 +167,7 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
   const bool is_nearly_still = !has_moved && turn_px < bound_px;
   stood_ = still_px || (stood_ && is_nearly_still);
   if (still_px) {
-    stand_ = {frame.number, view_.points};
+    stand_ = {frame.number, view_.points, stand_.keyframe};
     return FrameState::kStationary;
   }
   moving_view_ = view_;

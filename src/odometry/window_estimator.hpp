@@ -55,7 +55,8 @@ class MapIds {
 /// The last frame of a stand, which becomes a keyframe when the camera moves off.
 struct Stand {
   int frame = -1;       ///< below 0: there was none
-  Observations points;  ///< empty: it is a keyframe
+  Observations points;  ///< empty: they are a keyframe's
+  int keyframe = -1;    ///< frame of the stand that was one last
 };
 
 /// The estimator (`odometry.mode: map`): a window of keyframes is the truth, and a frame is

@@ -73,13 +73,25 @@ std::optional<double> most_likely(const Lengths& lengths) {
 
 }  // namespace
 
-/// The tracks that began while the camera stood are in no other keyframe.
+/// The tracks that began while the camera stood are in no other keyframe. One that stands again at
+/// the same place has its keyframe there anew: a window of one place would know no depth.
 void WindowEstimator::keep_stand() {
   Observations points = std::exchange(stand_.points, {});
-  if (stand_.frame > window_.keyframes.back().frame) {
-    append({stand_.frame, trajectory_[static_cast<std::size_t>(stand_.frame)], std::move(points)});
-    history_.add_keyframe(stand_.frame);
+  const int newest = window_.keyframes.back().frame;
+  if (stand_.frame <= newest) {
+    return;
   }
+  Keyframe keyframe{stand_.frame, trajectory_[static_cast<std::size_t>(stand_.frame)],
+                    std::move(points)};
+  if (std::exchange(stand_.keyframe, stand_.frame) == newest) {
+    const std::size_t last = window_.keyframes.size() - 1;
+    mapper_.leave(window_view(), last);
+    history_.leave(window_, last, keyframe);
+    drop_landmarks(window_, lost_tracks(window_, last, keyframe));
+    window_.keyframes.pop_back();
+  }
+  append(std::move(keyframe));
+  history_.add_keyframe(stand_.frame);
 }
 
 /// Null: the frame is not to be measured against one.
