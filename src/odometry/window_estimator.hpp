@@ -56,7 +56,7 @@ class MapIds {
 struct Stand {
   int frame = -1;       ///< below 0: there was none
   Observations points;  ///< empty: they are a keyframe's
-  int keyframe = -1;    ///< frame of the stand that was one last
+  int keyframe = -1;    ///< frame of the last stand that became one
 };
 
 /// The estimator (`odometry.mode: map`): a window of keyframes is the truth, and a frame is
@@ -170,6 +170,7 @@ class WindowEstimator final : public Estimator {
   // After localization.
   [[nodiscard]] bool is_keyframe(const View& view) const;
   void add_keyframe(const Frame& frame);
+  /// A full window first drops its leaving keyframe, which the map keeps.
   void append(Keyframe keyframe);
   /// An old place was recognized: the window keeps to it.
   void take_in(const Recognition& recognition);
