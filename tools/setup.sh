@@ -15,7 +15,7 @@ readonly PLOTLY_DIR=third_party/plotly
 PACKAGES=(
   build-essential cmake ninja-build pkg-config ccache git ca-certificates file
   libopencv-dev libeigen3-dev libceres-dev libtbb-dev libyaml-cpp-dev libcli11-dev libfmt-dev
-  nlohmann-json3-dev libdeflate-dev libturbojpeg0-dev libpng-dev libssl-dev
+  nlohmann-json3-dev libspng-dev libturbojpeg0-dev libssl-dev
   libgtest-dev libgmock-dev libbenchmark-dev python3 python3-venv python3-dev
 )
 

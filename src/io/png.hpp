@@ -17,35 +17,22 @@ using Bytes = std::span<const std::uint8_t>;
 /// The one size that an image may have; none: any, up to more pixels than a camera has.
 using WantedSize = std::optional<cv::Size>;
 
-/// The PNG, which is_png(), as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`. Errors,
-/// starting with `name`: of another size; cut off or damaged. An image is never partly decoded.
-/// `keeps_16_bits`: one of 16 bits a value stays so (CV_16UC1, CV_16UC3).
+/// The PNG, which is_png(), as 8-bit image without transparency: gray (CV_8UC1), or RGB (CV_8UC3)
+/// if `as_color`. Errors, starting with `name`: of another size; cut off or damaged. An image is
+/// never partly decoded. `keeps_16_bits`: one of 16 bits a value stays so (CV_16UC1, CV_16UC3).
 [[nodiscard]] Expected<cv::Mat> decode_png(Bytes bytes,
                                            const std::string& name,
                                            bool as_color,
                                            const WantedSize& wanted = {},
                                            bool keeps_16_bits = false);
 
-/// KITTI's kind of PNG (8-bit gray, or RGB with `as_color`), by libdeflate: in a third of the time
-/// that libpng and zlib take. Empty: another kind (interlaced, with chunks that may change pixels),
-/// or something in it is wrong (checksums are compared).
-[[nodiscard]] cv::Mat decode_plain_png(Bytes bytes, bool as_color);
-
-/// Every kind of PNG, by libpng, without transparency. Empty: damaged. Throws std::bad_alloc.
-[[nodiscard]] cv::Mat decode_any_png(Bytes bytes, bool as_color, bool keeps_16_bits = false);
-
 /// 8-bit image, gray or RGB -> the bytes of a PNG file. `is_fast`: larger, sooner. Throws
 /// std::bad_alloc.
 [[nodiscard]] std::string encode_png(const cv::Mat& image, bool is_fast = false);
 
-/// The size as a file declares it, which may be anything of 32 bits.
-struct DeclaredSize {
-  std::int64_t width = 0;
-  std::int64_t height = 0;
-};
 /// Error, starting with `name`: another size than is wanted. Called before memory is asked for.
 [[nodiscard]] Status check_size(const std::string& name,
-                                const DeclaredSize& found,
+                                const cv::Size2l& found,
                                 const WantedSize& wanted);
 
 [[nodiscard]] bool is_png(Bytes bytes);

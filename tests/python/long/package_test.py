@@ -173,7 +173,7 @@ class TestPackage:
         assert wheel.stat().st_size < 40e6
         for name in ("libavcodec", "libgdal"):  # what videos need, and GPL's codecs
             assert name not in done.stdout
-        for name in ("libopencv_core", "libonnxruntime", "libdeflate"):
+        for name in ("libopencv_core", "libonnxruntime", "libspng"):
             loaded = [line for line in done.stdout.splitlines() if name in line]
             assert loaded, name
             assert all(str(self.folder) in line for line in loaded), loaded[0]
