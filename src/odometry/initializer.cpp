@@ -178,9 +178,9 @@ std::optional<Window> Initializer::open_window(const View& now,
                                                const Camera& camera,
                                                const WindowOptions& window_options) const {
   Window window;
-  add_keyframe(window, {reference_.frame, reference_.world_from_camera, reference_.points},
-               window_options);
-  add_keyframe(window, {now.frame, now.world_from_camera, now.points}, window_options);
+  for (const View* view : {&reference_, &now}) {
+    window.keyframes.push_back({view->frame, view->world_from_camera, view->points});
+  }
   triangulate_landmarks(window, camera, window_options);
   if (static_cast<int>(window.landmarks.size()) < kMinLandmarks) {
     return std::nullopt;

@@ -100,11 +100,9 @@ void SelfCalibration::observe(const Keyframe& keyframe,
   }
   fuse_result();
   approach_target();
-  const WindowOptions window_options{.num_keyframes = kNumKeyframes};
-  Keyframe freed = keyframe;
-  free_again(radial_lens(camera_, radial), freed.points);
-  add_keyframe(run_, std::move(freed), window_options);
-  triangulate_landmarks(run_, camera_, window_options);
+  run_.keyframes.push_back(keyframe);
+  free_again(radial_lens(camera_, radial), run_.keyframes.back().points);
+  triangulate_landmarks(run_, camera_, {});
   if (static_cast<int>(run_.keyframes.size()) == kNumKeyframes) {
     begin_measuring(options);
   }

@@ -219,13 +219,9 @@ std::vector<int> lost_tracks(const Window& window, std::size_t leaving, const Ke
   return lost;
 }
 
-void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options) {
-  if (static_cast<int>(window.keyframes.size()) >= options.num_keyframes) {
-    const std::size_t leaving = leaving_keyframe(window, keyframe);
-    drop_landmarks(window, lost_tracks(window, leaving, keyframe));
-    window.keyframes.erase(window.keyframes.begin() + static_cast<std::ptrdiff_t>(leaving));
-  }
-  window.keyframes.push_back(std::move(keyframe));
+void drop_keyframe(Window& window, std::size_t leaving, const Keyframe& coming) {
+  drop_landmarks(window, lost_tracks(window, leaving, coming));
+  window.keyframes.erase(window.keyframes.begin() + static_cast<std::ptrdiff_t>(leaving));
 }
 
 void triangulate_landmarks(Window& window, const Camera& camera, const WindowOptions& options) {

@@ -29,8 +29,6 @@ constexpr double kTracksNoise_px = 0.05;
 constexpr double kHides = 2.0;
 /// So many times the flow of a stationary frame is what errors of landmarks do to one that turns.
 constexpr double kTurnFlow = 3.0;
-/// Who stood is believed to stand for so long where things that pass hide the world.
-constexpr double kHidden_s = 3.0;
 /// A track this near moves as the world does, where a thing is the other choice.
 constexpr double kAgrees_px = 1.0;
 
@@ -361,11 +359,15 @@ bool WindowEstimator::is_keyframe(const View& view) const {
 
 void WindowEstimator::append(Keyframe keyframe) {
   if (window_.keyframes.size() >= static_cast<std::size_t>(window_options_.num_keyframes)) {
-    const std::size_t leaving = leaving_keyframe(window_, keyframe);
-    mapper_.leave(window_view(), leaving);
-    history_.leave(window_, leaving, keyframe);
+    leave(leaving_keyframe(window_, keyframe), keyframe);
   }
-  stemvo::add_keyframe(window_, std::move(keyframe), window_options_);
+  window_.keyframes.push_back(std::move(keyframe));
+}
+
+void WindowEstimator::leave(std::size_t leaving, const Keyframe& coming) {
+  mapper_.leave(window_view(), leaving);
+  history_.leave(window_, leaving, coming);
+  drop_keyframe(window_, leaving, coming);
 }
 
 void WindowEstimator::add_keyframe(const Frame& frame) {

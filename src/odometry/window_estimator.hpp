@@ -136,6 +136,7 @@ class WindowEstimator final : public Estimator {
                            LocalizedFrame& localized);
 
   // A camera that stood moves off.
+  static constexpr double kHidden_s = 3.0;  ///< it is believed to stand where things hide the world
   void keep_stand();
   [[nodiscard]] const Keyframe* standing_keyframe(const Frame& frame,
                                                   const Observations& now) const;
@@ -170,8 +171,10 @@ class WindowEstimator final : public Estimator {
   // After localization.
   [[nodiscard]] bool is_keyframe(const View& view) const;
   void add_keyframe(const Frame& frame);
-  /// A full window first drops its leaving keyframe, which the map keeps.
+  /// A full window first drops its leaving keyframe.
   void append(Keyframe keyframe);
+  /// A keyframe of the window, which the map keeps, is dropped for the one that comes.
+  void leave(std::size_t leaving, const Keyframe& coming);
   /// An old place was recognized: the window keeps to it.
   void take_in(const Recognition& recognition);
   /// Units of motion that move the median landmark in view by a pixel.
