@@ -282,19 +282,8 @@ class Adjustment {
   void read_landmarks(MapAdjustment& result) const {
     for (std::size_t i = 0; i < points_.size(); ++i) {
       AdjustedLandmark& landmark = result.landmarks.emplace_back();
-      landmark.in_map = points_[i].in_map().hnormalized();
+      landmark.in_map = points_[i].in_map();
       landmark.views = tracks_[i];
-      const auto ray_from = [&](const MapView& view) -> Eigen::Vector3d {
-        const Rigid3 map_from_camera = poses_[slot(view.keyframe)].camera_from_map().inverse();
-        const Eigen::Vector4d at = points_[i].in_map();
-        return (at.head<3>() - at.w() * map_from_camera.translation).normalized();
-      };
-      const Eigen::Vector3d first = ray_from(tracks_[i].front());
-      for (const MapView& view : tracks_[i]) {
-        const Eigen::Vector3d other = ray_from(view);
-        landmark.max_parallax_rad = std::max(
-            landmark.max_parallax_rad, std::atan2(first.cross(other).norm(), first.dot(other)));
-      }
     }
   }
 
