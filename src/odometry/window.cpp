@@ -206,13 +206,11 @@ std::size_t leaving_keyframe(const Window& window, const Keyframe& coming) {
 }
 
 std::vector<int> lost_tracks(const Window& window, std::size_t leaving, const Keyframe& coming) {
-  const Keyframe& keyframe = window.keyframes[leaving];
   std::vector<int> lost;
-  for (const Observation& point : keyframe.points) {
-    const auto sees = [&](const Keyframe& other) {
-      return &other != &keyframe && find_point(other.points, point.track_id) != nullptr;
-    };
-    if (!sees(coming) && std::none_of(window.keyframes.begin(), window.keyframes.end(), sees)) {
+  ObservationWalk walk(window);
+  for (const Observation& point : window.keyframes[leaving].points) {
+    if (walk.seek(point.track_id).size() == 1 &&
+        find_point(coming.points, point.track_id) == nullptr) {
       lost.push_back(point.track_id);
     }
   }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "geometry/median.hpp"
@@ -56,13 +57,13 @@ std::vector<char> without(const std::vector<char>& some, const std::vector<char>
 /// One flag per landmark: its parallax since the first keyframe that sees it.
 std::vector<char> are_near(const Window& window, const SeenLandmarks& seen, const Rigid3& pose) {
   std::vector<char> flags(seen.points.size());
+  ObservationWalk walk(window);
   for (std::size_t i = 0; i < flags.size(); ++i) {
-    const auto first = std::ranges::find_if(window.keyframes, [&](const Keyframe& keyframe) {
-      return find_point(keyframe.points, seen.track_ids[i]) != nullptr;
-    });
-    flags[i] =
-        static_cast<char>(first != window.keyframes.end() &&
-                          parallax_rad(seen.points[i], first->world_from_camera, pose) > kNear_rad);
+    const std::span<const KeyframeObservation> views = walk.seek(seen.track_ids[i]);
+    flags[i] = static_cast<char>(
+        !views.empty() &&
+        parallax_rad(seen.points[i], window.keyframes[views.front().keyframe].world_from_camera,
+                     pose) > kNear_rad);
   }
   return flags;
 }
