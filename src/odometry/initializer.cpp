@@ -139,7 +139,6 @@ MeasuredMotion Initializer::measure_world(const PixelPairs& pairs, const Camera&
     world.is_decisive = world.is_decisive && !rivals->is_contested;
   }
   world.inlier_mask = scatter(world.inlier_mask, rivals->world_party);
-  world.moving_mask = std::move(rivals->moving_mask);
   return std::move(world);
 }
 

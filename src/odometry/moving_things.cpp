@@ -50,13 +50,6 @@ constexpr double kExplains = 0.75;
 /// Depth counts so many times.
 constexpr double kDepthWeight = 2.0;
 
-std::vector<char> inverted(std::vector<char> mask) {
-  for (char& flag : mask) {
-    flag = flag != 0 ? 0 : 1;
-  }
-  return mask;
-}
-
 MeasuredMotion measure_party(const std::vector<char>& party,
                              const PixelPairs& pairs,
                              const Camera& camera,
@@ -102,6 +95,14 @@ std::vector<double> cell_shares(std::span<const Eigen::Vector2d> uv,
   return shares;
 }
 
+std::vector<char> without(const std::vector<char>& some, const std::vector<char>& mask) {
+  std::vector<char> rest(mask.size());
+  std::ranges::transform(mask, some, rest.begin(), [](char is_kept, char is_one) {
+    return static_cast<char>(is_kept != 0 && is_one == 0);
+  });
+  return rest;
+}
+
 std::vector<char> scatter(const std::vector<char>& flags, const std::vector<char>& party) {
   std::vector<char> scattered(party.size(), 0);
   auto flag = flags.begin();
@@ -121,7 +122,7 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
   }
   const std::vector<char> plane =
       score_homography(*all.homography, pairs, options.sigma_px).inlier_mask;
-  const std::vector<char> rest = inverted(plane);
+  const std::vector<char> rest = without(plane, std::vector<char>(plane.size(), 1));
   const auto votes = [&](const std::vector<char>& agrees) {
     return cell_votes(pairs.cur_uv, agrees);
   };
@@ -144,7 +145,8 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
   }
   const bool has_depth = other.homography_ratio <= options.homography_ratio;
   if ((has_depth ? kDepthWeight : 1.0) * other_votes > plane_votes) {
-    return MotionRivals{std::move(other), rest, plane, false};
+    other.moving_mask = plane;
+    return MotionRivals{std::move(other), rest, false};
   }
   MeasuredMotion world = measure_party(plane, pairs, camera, estimator);
   if (world.state == FrameState::kLost) {
@@ -152,7 +154,8 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
   }
   // The other one's depth may yet show.
   const bool is_contested = kDepthWeight * other_votes > plane_votes;
-  return MotionRivals{std::move(world), plane, std::move(other_mask), is_contested};
+  world.moving_mask = std::move(other_mask);
+  return MotionRivals{std::move(world), plane, is_contested};
 }
 
 void MovingTracks::add(const Matches& matches, const std::vector<char>& moving_mask) {

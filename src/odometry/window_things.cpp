@@ -46,14 +46,6 @@ constexpr double kOffTimes = 3.0;
 constexpr double kMaxShift = 0.03;
 constexpr double kWorse = 2.5;
 
-std::vector<char> without(const std::vector<char>& some, const std::vector<char>& mask) {
-  std::vector<char> rest(mask.size());
-  std::ranges::transform(mask, some, rest.begin(), [](char is_kept, char is_one) {
-    return static_cast<char>(is_kept != 0 && is_one == 0);
-  });
-  return rest;
-}
-
 /// One flag per landmark: its parallax since the first keyframe that sees it.
 std::vector<char> are_near(const Window& window, const SeenLandmarks& seen, const Rigid3& pose) {
   std::vector<char> flags(seen.points.size());
