@@ -251,21 +251,27 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
     std::fill(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{0});
     return FrameState::kLost;
   }
-  // The length of the way since the reference is not known: the speed's in the time it moved.
   const View& reference = initializer_.reference();
   const Rigid3 direction = motion.cur_from_prev.inverse();
-  const double length = speed_ * (frame.time_s - reference.time_s - still_s_);
+  const bool is_tracking = motion.state == FrameState::kTracking;
+  const bool is_decisive = is_tracking && motion.is_decisive;
+  Observations now = current_points(frame.matches, motion.inlier_mask);
+  const std::optional<double> told =
+      is_decisive ? length_since_stand(now, motion.cur_from_prev) : std::nullopt;
+  // Where nothing tells the length of the way, it is the speed's in the time it moved.
+  const double length = told.value_or(speed_ * (frame.time_s - reference.time_s - still_s_));
   const Rigid3 guess =
       reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
-  const bool is_tracking = motion.state == FrameState::kTracking;
-  if (is_tracking && motion.is_decisive && go_on_from_stand(frame, motion)) {
-    return FrameState::kTracking;
-  }
-  if (is_tracking && motion.is_decisive && !mapper_.may_be_locating() &&
-      open_window({frame.number, guess, current_points(frame.matches, motion.inlier_mask),
-                   frame.time_s, frame.road})) {
+  View view{frame.number, guess, std::move(now), frame.time_s, frame.road};
+  if (told || (is_decisive && !mapper_.may_be_locating() && open_window(view))) {
+    world_from_camera_ = guess;
+    moved_to_ = guess.translation;
+    moving_view_ = view;
+    view_ = std::move(view);
     moving_.add(frame.matches, motion.moving_mask);
-    return FrameState::kInitializing;
+    stood_ = false;
+    is_initializing_ = false;
+    return told ? FrameState::kTracking : FrameState::kInitializing;
   }
   // Until there is a first map, the position is held; later the camera goes on as fast as it was.
   const bool goes_on = !window_.keyframes.empty() && is_tracking;
@@ -286,7 +292,7 @@ void WindowEstimator::reset_reference(View reference) {
   is_initializing_ = true;
 }
 
-bool WindowEstimator::open_window(View view) {
+bool WindowEstimator::open_window(const View& view) {
   const View& reference = initializer_.reference();
   std::optional<Window> window = initializer_.open_window(view, camera(), window_options_);
   if (!window.has_value()) {
@@ -301,13 +307,7 @@ bool WindowEstimator::open_window(View view) {
   scale_.restart(road_view.road.get(), road_view.time_s);
   calibration_.restart();
   road_pose_ = road_view.world_from_camera;
-  is_initializing_ = false;
-  world_from_camera_ = view.world_from_camera;
-  moved_to_ = view.world_from_camera.translation;
-  moving_view_ = view;
-  stood_ = false;
   stand_ = {};
-  view_ = std::move(view);
   return true;
 }
 

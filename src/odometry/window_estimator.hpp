@@ -140,7 +140,8 @@ class WindowEstimator final : public Estimator {
   void keep_stand();
   [[nodiscard]] const Keyframe* standing_keyframe(const Frame& frame,
                                                   const Observations& now) const;
-  [[nodiscard]] bool go_on_from_stand(const Frame& frame, const MeasuredMotion& motion);
+  [[nodiscard]] std::optional<double> length_since_stand(const Observations& now,
+                                                         const Rigid3& cur_from_stand) const;
 
   /// The pose if the last motion goes on. `turned`: its rotation, where that is known.
   [[nodiscard]] Rigid3 predict(const std::optional<Eigen::Quaterniond>& turned = {}) const {
@@ -151,7 +152,7 @@ class WindowEstimator final : public Estimator {
     return frame.has_image() && view_.frame == frame.number;
   }
   void reset_reference(View reference);
-  [[nodiscard]] bool open_window(View view);
+  [[nodiscard]] bool open_window(const View& view);
   [[nodiscard]] WindowView window_view() const {
     return {window_,     history_, camera(),      radials_,
             trajectory_, times_s_, metric_sigma_, view_.frame};

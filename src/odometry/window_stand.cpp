@@ -99,29 +99,15 @@ const Keyframe* WindowEstimator::standing_keyframe(const Frame& frame,
   return is_one ? &*stood : nullptr;
 }
 
-/// False: the motion's reference is no stand, or nothing tells how long the way is.
-bool WindowEstimator::go_on_from_stand(const Frame& frame, const MeasuredMotion& motion) {
+/// Nullopt: the reference is no stand, or nothing tells how long the way is.
+std::optional<double> WindowEstimator::length_since_stand(const Observations& now,
+                                                          const Rigid3& cur_from_stand) const {
   const View& stand = initializer_.reference();
-  if (stand.frame != stand_.frame) {
-    return false;
-  }
-  Observations now = current_points(frame.matches, motion.inlier_mask);
-  const std::optional<double> length = most_likely(
-      measure_lengths(find_seen_landmarks(window_, now), stand.world_from_camera.inverse(),
-                      motion.cur_from_prev, camera()));
-  if (!length.has_value()) {
-    return false;
-  }
-  const Rigid3 direction = motion.cur_from_prev.inverse();
-  world_from_camera_ =
-      stand.world_from_camera * Rigid3(direction.rotation, *length * direction.translation);
-  moved_to_ = world_from_camera_.translation;
-  view_ = {frame.number, world_from_camera_, std::move(now), frame.time_s};
-  moving_view_ = view_;
-  moving_.add(frame.matches, motion.moving_mask);
-  stood_ = false;
-  is_initializing_ = false;
-  return true;
+  return stand.frame != stand_.frame
+             ? std::nullopt
+             : most_likely(measure_lengths(find_seen_landmarks(window_, now),
+                                           stand.world_from_camera.inverse(), cur_from_stand,
+                                           camera()));
 }
 
 }  // namespace stemvo
