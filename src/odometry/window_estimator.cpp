@@ -219,15 +219,12 @@ FrameState WindowEstimator::measure_since_reference(const Frame& frame,
   const Keyframe* stood = had_map ? standing_keyframe(frame, now) : nullptr;
   if (stood != nullptr) {
     reset_reference({stood->frame, stood->world_from_camera, stood->points,
-                     times_s_[static_cast<std::size_t>(stood->frame)], nullptr});
+                     times_s_[slot(stood->frame)], nullptr});
   } else if (had_map || starts_elsewhere || initializer_.lost_reference(now)) {
     // Where the matches start: the frame before, or the last one before trouble.
     const int first = std::max(frame.matches.prev_frame, 0);
-    reset_reference({first,
-                     trajectory_[static_cast<std::size_t>(first)],
-                     {},
-                     times_s_[static_cast<std::size_t>(first)],
-                     first == last_.frame ? last_.road : nullptr});
+    const auto road = first == last_.frame ? last_.road : nullptr;
+    reset_reference({first, trajectory_[slot(first)], {}, times_s_[slot(first)], road});
   }
   MeasuredMotion motion = initializer_.measure(frame.matches, now, camera());
   const double num_matches = static_cast<double>(frame.matches.cur_uv.size());
