@@ -37,12 +37,6 @@ constexpr int kMaxClusters = 40;
 /// Clusters are alike, too, where the motion stays the same.
 constexpr double kLikeErrors = 2.0;
 
-auto distance_from_first(const KeptMap& map) {
-  return [&map](const Similarity3& at) {
-    return (at.translation - map.map_from_keyframe.front().translation).norm();
-  };
-}
-
 ceres::Problem::Options shared_losses() {
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -199,11 +193,13 @@ class Adjustment {
     }
     if (map_.lengths.empty()) {
       // Any length, so that there is a scale.
-      const auto far =
-          std::ranges::max_element(map_.map_from_keyframe, {}, distance_from_first(map_));
-      if (const double distance = distance_from_first(map_)(*far); distance > 0.0) {
-        add_distance(0, static_cast<int>(far - map_.map_from_keyframe.begin()), std::log(distance),
-                     1e-3);
+      const std::vector<Similarity3>& at = map_.map_from_keyframe;
+      const auto distance_from_first = [&](const Similarity3& other) {
+        return (other.translation - at.front().translation).norm();
+      };
+      const auto far = std::ranges::max_element(at, {}, distance_from_first);
+      if (const double distance = distance_from_first(*far); distance > 0.0) {
+        add_distance(0, static_cast<int>(far - at.begin()), std::log(distance), 1e-3);
       }
     }
   }

@@ -298,8 +298,9 @@ std::optional<Expectation> PlaceRecognizer::look_around(const Question& question
 std::optional<Sighting> PlaceRecognizer::look_at(const Question& question, const Look& look) const {
   const auto& [map, components, number, keyframe] = question;
   const KeptKeyframe& old = keyframe_of(map, look.place);
-  if (!is_far(question, look.place) || (num_shared(track_ids_of(old), last_tracks_) > kMaxTracks &&
-                                        !has_come_back(map, place_of(look.place), number))) {
+  if (!is_far(question, look.place) ||
+      (num_shared(track_ids_of(old), last_tracks_) > kMaxTracks &&
+       !has_come_back(map, places_around(look.place, 0).front(), number))) {
     return std::nullopt;
   }
   const PlaceView recent{keyframe.camera, keyframe.corners, look.seen};

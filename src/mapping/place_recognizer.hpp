@@ -100,9 +100,6 @@ class PlaceRecognizer {
   [[nodiscard]] std::vector<Look> expected_looks(const Question& question,
                                                  LookDescriptors& described);
   void begin_lookup(const KeptKeyframe& keyframe);
-  [[nodiscard]] const Place& place_of(int keyframe) const {
-    return *std::ranges::lower_bound(places_, keyframe, {}, &Place::keyframe);
-  }
   /// The window remembers places just before in its own map.
   [[nodiscard]] bool is_far(const Question& question, int place) const {
     return place < end_of_far() || question.is_elsewhere(place);

@@ -2,7 +2,6 @@
 #include "odometry/moving_things.hpp"
 
 #include <functional>
-#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -85,14 +84,6 @@ double cell_votes(std::span<const Eigen::Vector2d> uv, const std::vector<char>& 
     votes += cell.share();
   }
   return votes;
-}
-
-std::vector<double> cell_shares(std::span<const Eigen::Vector2d> uv,
-                                const std::vector<char>& agrees) {
-  std::vector<double> shares;
-  std::ranges::transform(Cells(uv, agrees).of_point, std::back_inserter(shares),
-                         [](const auto* cell) { return cell->share(); });
-  return shares;
 }
 
 std::vector<char> without(const std::vector<char>& some, const std::vector<char>& mask) {
@@ -178,10 +169,11 @@ void MovingTracks::observe(const Matches& matches, const std::vector<char>& fits
   const std::vector<char> fits_thing =
       score_homography(*motion, {matches.prev_uv, matches.cur_uv}, options_.inlier_threshold_px)
           .inlier_mask;
-  const std::vector<double> shares = cell_shares(matches.cur_uv, moving);
+  const Cells cells(matches.cur_uv, moving);
   for (std::size_t i = 0; i < moving.size(); ++i) {
     const int vote = (fits_thing[i] != 0 ? 1 : 0) - (fits_world[i] != 0 ? 1 : 0);
-    const bool joins = fits_thing[i] != 0 && (fits_world[i] == 0 || shares[i] > 0.5);
+    const bool joins =
+        fits_thing[i] != 0 && (fits_world[i] == 0 || cells.of_point[i]->share() > 0.5);
     const int evidence = moving[i] != 0
                              ? std::min(before[matches.track_ids[i]] + vote, kMostEvidence)
                              : (joins ? kFirstEvidence : 0);

@@ -25,10 +25,6 @@ namespace stemvo {
 [[nodiscard]] double cell_votes(std::span<const Eigen::Vector2d> uv,
                                 const std::vector<char>& agrees);
 
-/// For each point the share of its cell's points that agree.
-[[nodiscard]] std::vector<double> cell_shares(std::span<const Eigen::Vector2d> uv,
-                                              const std::vector<char>& agrees);
-
 /// The flags of a mask but for some.
 [[nodiscard]] std::vector<char> without(const std::vector<char>& some,
                                         const std::vector<char>& mask);

@@ -140,7 +140,7 @@ void WayScale::join_ended(Queue& queue) const {
     } else {
       joined = way;
     }
-    if (!covers(*joined)) {
+    if (joined->from_s < stations_.front().time_s) {
       joined.reset();
     }
   }

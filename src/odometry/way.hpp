@@ -113,9 +113,6 @@ class WayScale {
     const double share = (time_s - before.time_s) / (after->time_s - before.time_s);
     return before.length + share * (after->length - before.length);
   }
-  [[nodiscard]] bool covers(const Way& way) const {
-    return way.from_s >= stations_.front().time_s && way.to_s <= stations_.back().time_s;
-  }
   void join_ended(Queue& queue) const;
   [[nodiscard]] bool measure(Queue& queue, ScaleFilter& filter) const;
   /// By ways, or parts of ways, that are inside the path.
