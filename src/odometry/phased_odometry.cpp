@@ -4,10 +4,8 @@
 #include <opencv2/core/utility.hpp>
 
 #include "internal_check.hpp"
-#include "mapping/map_file.hpp"
 #include "odometry/check_frame.hpp"
 #include "odometry/frame_clock.hpp"
-#include "odometry/whole_map.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
 #include "try.hpp"
@@ -71,10 +69,6 @@ Status PhasedOdometry::check_remembers(const std::string& asked) const {
              ? Status()
              : fail(fmt::format("{}: expected odometry.mode map with odometry.loops true, found {}",
                                 asked, is_map ? "loops false" : "mode two_frame"));
-}
-
-Status PhasedOdometry::save_map(const std::filesystem::path& file, const WholeMap& map) const {
-  return write_map_file(file, {channel_name(), map.kept});
 }
 
 Status PhasedOdometry::load_map(const std::filesystem::path& file) {
