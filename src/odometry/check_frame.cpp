@@ -27,18 +27,6 @@ Status check_image(const cv::Mat& image, PixelOrder order, const Camera& camera)
   return {};
 }
 
-Status check_time(double time_s, std::optional<double> last_s) {
-  constexpr double kMax_s = 1e11;  // 3,000 years: those since 1970 in another unit are above it
-  if (!(std::abs(time_s) <= kMax_s) || (last_s && time_s <= *last_s)) {
-    return fail(fmt::format("time: expected {}, found {} s",
-                            last_s && time_s <= *last_s
-                                ? fmt::format("one after the last frame's, {} s", *last_s)
-                                : fmt::format("a finite number of seconds up to {:g}", kMax_s),
-                            time_s));
-  }
-  return {};
-}
-
 Status check_rotation(const std::optional<Eigen::Quaterniond>& rotation) {
   constexpr double kMaxOff = 0.01;  // single precision and a few products are within
   if (rotation && !(std::abs(rotation->norm() - 1.0) < kMaxOff)) {
@@ -148,6 +136,21 @@ std::string doubt_of(const Camera& camera) {
       scale == 1.0 ? "another size" : fmt::format("images about {:.2g} times as large", scale));
 }
 
+Status check_time(const std::string& name,
+                  double time_s,
+                  std::optional<double> last_s,
+                  const std::string& of_last) {
+  constexpr double kMax_s = 1e11;  // 3,000 years: those since 1970 in another unit are above it
+  const bool is_late = last_s && time_s <= *last_s;
+  if (std::abs(time_s) <= kMax_s && !is_late) {
+    return {};
+  }
+  return fail(fmt::format("{}: expected {}, found {} s", name,
+                          is_late ? fmt::format("one after the last {}'s, {} s", of_last, *last_s)
+                                  : fmt::format("a finite number of seconds up to {:g}", kMax_s),
+                          time_s));
+}
+
 Status check_mask(const cv::Mat& mask, const Camera& camera) {
   const cv::Size size(camera.width_px, camera.height_px);
   if (!mask.empty() && (mask.size() != size || mask.type() != CV_8UC1)) {
@@ -171,7 +174,7 @@ Status FrameCheck::admit(const cv::Mat& image,
                          double time_s,
                          const FrameHints& hints) {
   STEMVO_TRY(check_image(image, order, camera_));
-  STEMVO_TRY(check_time(time_s, last_time_s_));
+  STEMVO_TRY(check_time("time", time_s, last_time_s_, "frame"));
   STEMVO_TRY(check_mask(hints.mask, camera_));
   STEMVO_TRY(check_rotation(hints.prev_from_cur));
   last_time_s_ = time_s;

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <deque>
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -54,7 +53,7 @@ class WayInput {
   };
   ScaleSource source_;
   std::optional<Speed> last_speed_;
-  double last_to_s_ = -std::numeric_limits<double>::infinity();  ///< of a distance
+  std::optional<double> last_to_s_;  ///< of a distance
   std::vector<Way> ways_;
 };
 
