@@ -117,9 +117,10 @@ std::optional<Localization> WindowEstimator::localize_by_near(const SeenLandmark
   const auto near_px = [&](const std::vector<double>& errors_px) {
     return median(select(errors_px, is_near));
   };
-  const std::vector<double> errors_px = distances_px(seen, world->world_from_camera, camera());
+  const std::vector<double> errors_px =
+      distances_px(seen, world->world_from_camera.inverse(), camera());
   if (way(found) > kMaxShift * way(last_.world_from_camera) &&
-      near_px(distances_px(seen, found, camera())) < kWorse * near_px(errors_px)) {
+      near_px(distances_px(seen, found.inverse(), camera())) < kWorse * near_px(errors_px)) {
     return std::nullopt;
   }
   const std::vector<char> is_far = without(is_near, std::vector<char>(is_near.size(), 1));
