@@ -22,12 +22,6 @@ constexpr double kMinBundleDepth = 1e-6;
 constexpr double kFirstDamping = 1e-7;
 constexpr int kCamera = NormalEquations::kCamera;
 
-std::vector<Eigen::Matrix3d> rotations_of(const Bundle& bundle) {
-  std::vector<Eigen::Matrix3d> rotations(bundle.camera_from_world.size());
-  std::ranges::transform(bundle.camera_from_world, rotations.begin(), &Rigid3::rotation_matrix);
-  return rotations;
-}
-
 template <std::size_t kColumns>
 void copy(const NormalEquations::Block<kColumns>& from,
           int num_rows,
@@ -169,7 +163,8 @@ class ReducedEquations {
 /// Every observation under the bundle, and the robust cost: infinite where a point is behind a pose
 /// that sees it.
 double reproject(const Bundle& bundle, double loss_scale_px, std::vector<Reprojection>& result) {
-  const std::vector<Eigen::Matrix3d> rotations = rotations_of(bundle);
+  std::vector<Eigen::Matrix3d> rotations(bundle.camera_from_world.size());
+  std::ranges::transform(bundle.camera_from_world, rotations.begin(), &Rigid3::rotation_matrix);
   result.clear();
   CauchyLoss loss(loss_scale_px);
   for (const Bundle::Observation& observation : bundle.observations) {

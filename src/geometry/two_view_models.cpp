@@ -253,9 +253,6 @@ std::optional<TwoViewMotion> best_motion(TwoViewModel model,
 }
 
 bool is_decisive(const TwoViewMotion& motion, int num_matches, const AcceptanceOptions& options) {
-  if (motion.model == TwoViewModel::kNone) {
-    return false;
-  }
   const double max_runner_up = motion.model == TwoViewModel::kHomography
                                    ? options.max_runner_up_homography
                                    : options.max_runner_up_essential;

@@ -80,8 +80,7 @@ void refine(std::vector<Hypothesis>& hypotheses,
     hypothesis.cur_from_prev = refined.cur_from_prev;
     hypothesis.cost = refined.cost;
   }
-  std::sort(hypotheses.begin(), hypotheses.end(),
-            [](const Hypothesis& a, const Hypothesis& b) { return a.cost < b.cost; });
+  std::ranges::sort(hypotheses, {}, &Hypothesis::cost);
 }
 
 /// Flags of tracks as flags of matches; `otherwise`: that of a match which is no such track.
