@@ -118,8 +118,9 @@ void WayScale::move(const Rigid3& cur_from_prev, double time_s, double pixel_uni
   }
 }
 
-void WayScale::join_ended(Queue& queue) const {
+bool WayScale::measure(Queue& queue, ScaleFilter& filter) const {
   auto& [waiting, joined] = queue;
+  // Those that have ended are one way.
   for (; !waiting.empty() && waiting.front().to_s <= stations_.back().time_s; waiting.pop_front()) {
     const Way& way = waiting.front();
     if (joined && std::abs(way.from_s - joined->to_s) < kSameTime_s) {
@@ -133,14 +134,10 @@ void WayScale::join_ended(Queue& queue) const {
       joined.reset();
     }
   }
-}
-
-bool WayScale::measure(Queue& queue, ScaleFilter& filter) const {
-  join_ended(queue);
-  if (!queue.joined) {
+  if (!joined) {
     return false;
   }
-  const Way& way = *queue.joined;
+  const Way& way = *joined;
   const double units = length_at(way.to_s) - length_at(way.from_s);
   if (!(units > 0.0 && units >= kStation_px * pixel_units_ &&
         way.metres > kMinWaySigmas * way.sigma_m)) {
@@ -149,7 +146,7 @@ bool WayScale::measure(Queue& queue, ScaleFilter& filter) const {
   const double sigma =
       std::hypot(way.sigma_m / way.metres, std::sqrt(2.0) * kPlace_px * pixel_units_ / units);
   const bool is_believed = filter.update(std::log(way.metres / units), sigma, ScaleWitness::kWay);
-  queue.joined.reset();
+  joined.reset();
   return is_believed;
 }
 

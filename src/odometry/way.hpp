@@ -112,7 +112,6 @@ class WayScale {
     const double share = (time_s - before.time_s) / (after->time_s - before.time_s);
     return before.length + share * (after->length - before.length);
   }
-  void join_ended(Queue& queue) const;
   [[nodiscard]] bool measure(Queue& queue, ScaleFilter& filter) const;
   /// By ways, or parts of ways, that are inside the path.
   void guess(ScaleFilter& filter) const;
