@@ -30,9 +30,7 @@ Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
   const cv::Mat blank(seen.height_px, seen.width_px, CV_8UC1, cv::Scalar(0));
   const int zoom = stem.frame_zoom(
       choose_tracking_resolution(options.stem.tracking_resolution, options.features.method, seen));
-  if (const Expected<Channel> channel = stem.apply(blank, zoom); !channel) {
-    return channel.error();
-  }
+  STEMVO_TRY(stem.apply(blank, zoom));
   return PhasedOdometry(options, *view, mask, std::move(stem), zoom);
 }
 
