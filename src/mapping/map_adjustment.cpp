@@ -90,11 +90,6 @@ class Adjustment {
   }
 
  private:
-  struct Corner {
-    const CornerError* error;
-    std::array<const double*, 3> at;
-  };
-
   [[nodiscard]] const Camera& base_camera(int keyframe) const {
     return keyframe < options_.num_of_other_camera ? map_.keyframes[slot(keyframe)].camera
                                                    : options_.camera;
@@ -141,11 +136,10 @@ class Adjustment {
         AdjustedPose& pose = poses_[slot(view.keyframe)];
         auto* error = new CornerError(frame_uv(view), base_camera(view.keyframe), points_[i], pose,
                                       sigma_px_);
-        double* camera = camera_change(view.keyframe);
-        residuals_.push_back({problem_.AddResidualBlock(error, &corner_loss_, points_[i].at.data(),
-                                                        pose.delta.data(), camera),
-                              tracks_[i].front().keyframe * num_clusters / num_keyframes});
-        corners_.push_back({error, {points_[i].at.data(), pose.delta.data(), camera}});
+        residuals_.push_back(
+            {problem_.AddResidualBlock(error, &corner_loss_, points_[i].at.data(),
+                                       pose.delta.data(), camera_change(view.keyframe)),
+             tracks_[i].front().keyframe * num_clusters / num_keyframes});
       }
     }
   }
@@ -236,11 +230,14 @@ class Adjustment {
 
   void measure_errors(double sigma_factor) {
     std::vector<double> errors;
-    errors.reserve(corners_.size());
-    for (const Corner& corner : corners_) {
-      Eigen::Vector2d error;
-      corner.error->Evaluate(corner.at.data(), error.data(), nullptr);
-      errors.push_back(sigma_px_ * error.norm());
+    errors.reserve(residuals_.size());
+    for (const ClusteredResidual& residual : residuals_) {
+      if (residual.cluster >= 0) {  // a corner's
+        Eigen::Vector2d error;
+        double cost = 0.0;
+        problem_.EvaluateResidualBlock(residual.block, false, &cost, error.data(), nullptr);
+        errors.push_back(sigma_px_ * error.norm());
+      }
     }
     median_error_px_ = median(std::move(errors));
     sigma_px_ = sigma_factor * std::max(median_error_px_ / kMedianOfRayleigh, kMinSigma_px);
@@ -334,7 +331,6 @@ class Adjustment {
   std::array<double, 6> no_change_ = {};  ///< of other recordings' cameras
   double median_error_px_ = 0.0;
   double sigma_px_ = 1.0;
-  std::vector<Corner> corners_;
   std::vector<ClusteredResidual> residuals_;
   ceres::LossFunctionWrapper corner_loss_{nullptr, ceres::TAKE_OWNERSHIP};
   ceres::CauchyLoss loop_loss_{kLooseLoop};
