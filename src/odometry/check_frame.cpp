@@ -106,16 +106,12 @@ Status check_camera(const Camera& camera, const std::string& owner) {
 std::string doubt_of(const Camera& camera) {
   constexpr double kMaxOff = 0.15;
   constexpr double kMinView_deg = 10.0;
-  if (view_deg_of(camera) < kMinView_deg) {
-    return fmt::format("a field of view of {:.1f} degrees is small: is the focal length in pixels?",
-                       view_deg_of(camera));
-  }
-  constexpr double kMaxView_deg = 130.0;
-  if (view_deg_of(camera) > kMaxView_deg && camera.distortion != Distortion::kEquidistant) {
-    return fmt::format(
-        "a field of view of {:.0f} degrees is large for a lens that is no fisheye: "
-        "is the focal length in pixels?",
-        view_deg_of(camera));
+  constexpr double kMaxView_deg = 130.0;  // of a lens that is no fisheye
+  const double view_deg = view_deg_of(camera);
+  const bool is_large = view_deg > kMaxView_deg && camera.distortion != Distortion::kEquidistant;
+  if (view_deg < kMinView_deg || is_large) {
+    return fmt::format("a field of view of {:.1f} degrees is {}: is the focal length in pixels?",
+                       view_deg, is_large ? "large for a lens that is no fisheye" : "small");
   }
   constexpr double kMaxRatio = 1.2;
   const double ratio = camera.fx_px / camera.fy_px;
