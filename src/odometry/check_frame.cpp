@@ -14,15 +14,12 @@
 namespace stemvo {
 namespace {
 
-Status check_image(const cv::Mat& image, PixelOrder order, const Camera& camera) {
-  if (image.cols != camera.width_px || image.rows != camera.height_px) {
-    return fail(fmt::format("image: expected {}x{} pixels, as the camera has, found {}x{}",
-                            camera.width_px, camera.height_px, image.cols, image.rows));
-  }
-  const int channels = order == PixelOrder::kGray ? 1 : 3;
-  if (image.type() != CV_MAKETYPE(CV_8U, channels)) {
-    return fail(fmt::format("image: expected {} channel{} of 8 bit, found OpenCV's type {}",
-                            channels, channels == 1 ? "" : "s", cv::typeToString(image.type())));
+Status check_pixels(const char* name, const cv::Mat& pixels, int type, const Camera& camera) {
+  const cv::Size size(camera.width_px, camera.height_px);
+  if (pixels.size() != size || pixels.type() != type) {
+    return fail(fmt::format("{}: expected {}x{} pixels of {}, found {}x{} of {}", name, size.width,
+                            size.height, cv::typeToString(type), pixels.cols, pixels.rows,
+                            cv::typeToString(pixels.type())));
   }
   return {};
 }
@@ -148,12 +145,7 @@ Status check_time(const std::string& name,
 }
 
 Status check_mask(const cv::Mat& mask, const Camera& camera) {
-  const cv::Size size(camera.width_px, camera.height_px);
-  if (!mask.empty() && (mask.size() != size || mask.type() != CV_8UC1)) {
-    return fail(fmt::format("mask: expected {}x{} pixels of CV_8UC1, found {}x{} of {}", size.width,
-                            size.height, mask.cols, mask.rows, cv::typeToString(mask.type())));
-  }
-  return {};
+  return mask.empty() ? Status() : check_pixels("mask", mask, CV_8UC1, camera);
 }
 
 cv::Mat rgb_of(const cv::Mat& image, PixelOrder order) {
@@ -169,7 +161,8 @@ Status FrameCheck::admit(const cv::Mat& image,
                          PixelOrder order,
                          double time_s,
                          const FrameHints& hints) {
-  STEMVO_TRY(check_image(image, order, camera_));
+  const int type = order == PixelOrder::kGray ? CV_8UC1 : CV_8UC3;
+  STEMVO_TRY(check_pixels("image", image, type, camera_));
   STEMVO_TRY(check_time("time", time_s, last_time_s_, "frame"));
   STEMVO_TRY(check_mask(hints.mask, camera_));
   STEMVO_TRY(check_rotation(hints.prev_from_cur));
