@@ -75,12 +75,6 @@ class MovingTracks {
     });
     return mask;
   }
-  /// Clears their flags in a mask, one per match.
-  void leave_out(const Matches& matches, std::vector<char>& mask) const {
-    for (std::size_t i = 0; i < mask.size(); ++i) {
-      mask[i] = evidence_.contains(matches.track_ids[i]) ? char{0} : mask[i];
-    }
-  }
 
  private:
   TwoViewOptions options_;

@@ -63,8 +63,7 @@ LocalizedFrame WindowEstimator::localize(const Frame& frame) {
   LocalizedFrame localized;
   FrameResult& result = localized.result;
   std::vector<char>& mask = localized.inlier_mask;
-  mask.assign(frame.matches.cur_uv.size(), 1);
-  moving_.leave_out(frame.matches, mask);
+  mask = without(moving_.flags(frame.matches), std::vector<char>(frame.matches.cur_uv.size(), 1));
   result.state = find_pose(frame, localized);
   was_static_ = frame.has_image() ? result.state != FrameState::kTracking : was_static_;
   result.num_matches = static_cast<int>(mask.size());
@@ -139,7 +138,7 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
     mark_outliers(frame.matches, kAgrees_px, fits_world);
     moving_.observe(frame.matches, fits_world);
     localized.moving_mask = moving_.flags(frame.matches);
-    moving_.leave_out(frame.matches, localized.inlier_mask);
+    localized.inlier_mask = without(localized.moving_mask, localized.inlier_mask);
   }
   Observations now = current_points(frame.matches, localized.inlier_mask);
   const SeenLandmarks seen = find_seen_landmarks(window_, now);
