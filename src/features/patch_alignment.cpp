@@ -31,16 +31,13 @@ constexpr float kMinNormSq = 64.0F;
 constexpr float kMinDeterminant = 1e-3F;
 constexpr float kMinCondition = 1e-5F;
 
-/// A coarse patch around it, with the samples of its gradient, is inside the border.
-bool is_readable(const BorderedImage& image, float x, float y) {
-  constexpr float kOutside = 12.0F;
-  return x >= -kOutside && y >= -kOutside && x <= static_cast<float>(image.width - 1) + kOutside &&
-         y <= static_cast<float>(image.height - 1) + kOutside;
-}
+/// So far outside, a coarse patch and the samples of its gradient are inside the border.
+constexpr float kReadable_px = 12.0F;
 
-bool is_in_image(const BorderedImage& image, float x, float y) {
-  return x >= 0.0F && y >= 0.0F && x <= static_cast<float>(image.width - 1) &&
-         y <= static_cast<float>(image.height - 1);
+bool is_in_image(const BorderedImage& image, float x, float y, float outside_px = 0.0F) {
+  return x >= -outside_px && y >= -outside_px &&
+         x <= static_cast<float>(image.width - 1) + outside_px &&
+         y <= static_cast<float>(image.height - 1) + outside_px;
 }
 
 void cut_coarse(const BorderedImage& image, float x, float y, Patch::Coarse& coarse) {
@@ -125,7 +122,7 @@ bool align_coarse(const Patch::Coarse& patch, const BorderedImage& image, float&
   constexpr float kHalf = 0.5F * (kCoarseSide - 1);
   const auto& inverse = patch.inverse_hessian;
   for (int i = 0; i < kCoarseIterations; ++i) {
-    if (!is_readable(image, x, y)) {
+    if (!is_in_image(image, x, y, kReadable_px)) {
       return false;
     }
     float sums[2];
@@ -138,7 +135,7 @@ bool align_coarse(const Patch::Coarse& patch, const BorderedImage& image, float&
       break;
     }
   }
-  return is_readable(image, x, y);
+  return is_in_image(image, x, y, kReadable_px);
 }
 
 /// W <- W o dW^-1; similarities are complex numbers. Returns the length of the step.

@@ -13,10 +13,6 @@ namespace {
 /// A smaller share of the points tracked: the image is of no use, or of another place.
 constexpr double kMinTracked = 0.1;
 
-Eigen::Vector2d to_input(const PixelMap& map, const cv::Point2f& uv) {
-  return map.to_input({static_cast<double>(uv.x), static_cast<double>(uv.y)});
-}
-
 cv::Point pixel_of(const cv::Mat& image, const cv::Point2f& uv) {
   return {std::clamp(cvRound(uv.x), 0, image.cols - 1),
           std::clamp(cvRound(uv.y), 0, image.rows - 1)};
@@ -62,11 +58,8 @@ Matches PointFrontEnd::process(std::shared_ptr<const ImagePyramid> image, const 
 /// Nearly every track ended: darkness, a blow, or another place. Where the image before the trouble
 /// tells more than the last one, its tracks go on.
 void PointFrontEnd::track_from_last_good(View& now, Matches& matches) {
-  if (last_good_.image == nullptr && !last_.points.empty()) {
-    last_good_ = std::move(last_);
-    return;
-  }
   if (last_good_.image == nullptr) {
+    last_good_ = last_.points.empty() ? View() : std::move(last_);
     return;
   }
   View again{now.image, {}, now.frame, now.time_s};
@@ -104,8 +97,8 @@ Matches PointFrontEnd::track(const View& from, View& to) {
     }
     const Point& point = from.points[i];
     to.points.push_back({*found[i], point.id});
-    matches.prev_uv.push_back(to_input(from.image->channel.map, point.uv));
-    matches.cur_uv.push_back(to_input(to.image->channel.map, *found[i]));
+    matches.prev_uv.push_back(from.image->channel.map.to_input({point.uv.x, point.uv.y}));
+    matches.cur_uv.push_back(to.image->channel.map.to_input({found[i]->x, found[i]->y}));
     matches.track_ids.push_back(point.id);
   }
   return matches;

@@ -22,12 +22,6 @@ constexpr double kMinBundleDepth = 1e-6;
 constexpr double kFirstDamping = 1e-7;
 constexpr int kCamera = NormalEquations::kCamera;
 
-std::vector<Eigen::Matrix3d> rotations_of(const Bundle& bundle) {
-  std::vector<Eigen::Matrix3d> rotations(bundle.camera_from_world.size());
-  std::ranges::transform(bundle.camera_from_world, rotations.begin(), &Rigid3::rotation_matrix);
-  return rotations;
-}
-
 template <std::size_t kColumns>
 void copy(const NormalEquations::Block<kColumns>& from,
           int num_rows,
@@ -54,17 +48,15 @@ class ReducedEquations {
   /// Around the bundle, with the points' blocks damped.
   void linearize(const Bundle& bundle, const std::vector<Reprojection>& at, double damping) {
     equations_.add_up(bundle, at, damping);
-    const NormalEquations::Block<2> of_camera = {equations_.camera.gradient,
-                                                 equations_.camera.diagonal};
     Eigen::Matrix<double, Eigen::Dynamic, 2> columns(size_, 2);  // gradient, diagonal
-    copy(of_camera, num_camera_, columns.topRows(num_camera_));
-    copy(equations_.camera.with_camera, num_camera_,
-         reduced_.topLeftCorner(num_camera_, num_camera_));
+    const auto add = [&](const auto& of, int row, int size) {
+      copy(NormalEquations::Block<2>{of.gradient, of.diagonal}, size,
+           columns.middleRows(row, size));
+      copy(of.with_camera, num_camera_, reduced_.block(0, row, num_camera_, size));
+    };
+    add(equations_.camera, 0, num_camera_);
     for (int j = 0; j < equations_.num_free_poses(); ++j) {
-      const NormalEquations::Pose& pose = equations_.poses[static_cast<std::size_t>(j)];
-      copy(NormalEquations::Block<2>{pose.gradient, pose.diagonal}, 6,
-           columns.middleRows<6>(row_of(j)));
-      copy(pose.with_camera, num_camera_, reduced_.block(0, row_of(j), num_camera_, 6));
+      add(equations_.poses[static_cast<std::size_t>(j)], row_of(j), 6);
       for (int i = 0; i <= j; ++i) {
         copy(equations_.H_pp[equations_.index_of(i, j)], 6,
              reduced_.block<6, 6>(row_of(i), row_of(j)));
@@ -171,7 +163,8 @@ class ReducedEquations {
 /// Every observation under the bundle, and the robust cost: infinite where a point is behind a pose
 /// that sees it.
 double reproject(const Bundle& bundle, double loss_scale_px, std::vector<Reprojection>& result) {
-  const std::vector<Eigen::Matrix3d> rotations = rotations_of(bundle);
+  std::vector<Eigen::Matrix3d> rotations(bundle.camera_from_world.size());
+  std::ranges::transform(bundle.camera_from_world, rotations.begin(), &Rigid3::rotation_matrix);
   result.clear();
   CauchyLoss loss(loss_scale_px);
   for (const Bundle::Observation& observation : bundle.observations) {

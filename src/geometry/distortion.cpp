@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -17,14 +18,6 @@ constexpr double kStep = 0.5;             ///< between the divisors that are tri
 constexpr double kMinScale = 0.8;
 constexpr double kMaxScale = 2.0;
 constexpr int kNumHalvings = 30;  // of the interval between them
-
-double divisor_of(double num_pixels) {
-  double divisor = 1.0;
-  while (num_pixels > kMaxPixels && num_pixels / (divisor * divisor) > kWorkingPixels) {
-    divisor += kStep;
-  }
-  return divisor;
-}
 
 /// Distance from the centre, without the tangential part, which is small and moves all around.
 double distorted_radius(const Camera& camera, double radius) {
@@ -81,20 +74,11 @@ bool lies_inside(const Camera& camera, const Camera& view) {
       radius = std::max(radius, view.normalize({u, v}).norm());
     }
   }
-  if (!is_one_to_one(camera, radius)) {
-    return false;
-  }
-  for (int u = 0; u < view.width_px; ++u) {
-    if (!is_inside(u, 0.0) || !is_inside(u, bottom)) {
-      return false;
-    }
-  }
-  for (int v = 0; v < view.height_px; ++v) {
-    if (!is_inside(0.0, v) || !is_inside(right, v)) {
-      return false;
-    }
-  }
-  return true;
+  const auto is_column_inside = [&](int u) { return is_inside(u, 0.0) && is_inside(u, bottom); };
+  const auto is_row_inside = [&](int v) { return is_inside(0.0, v) && is_inside(right, v); };
+  return is_one_to_one(camera, radius) &&
+         std::ranges::all_of(std::views::iota(0, view.width_px), is_column_inside) &&
+         std::ranges::all_of(std::views::iota(0, view.height_px), is_row_inside);
 }
 
 /// The smallest scale of the focal lengths whose view lies inside.
@@ -152,9 +136,13 @@ Eigen::Vector2d source_pixel(const Camera& camera, const Camera& view, const Eig
 }
 
 Camera working_camera(Camera camera) {
-  const double divisor = divisor_of(static_cast<double>(camera.width_px) * camera.height_px);
-  if (divisor == 1.0) {
+  const double num_pixels = static_cast<double>(camera.width_px) * camera.height_px;
+  if (num_pixels <= kMaxPixels) {
     return camera;
+  }
+  double divisor = 1.0;
+  while (num_pixels / (divisor * divisor) > kWorkingPixels) {
+    divisor += kStep;
   }
   const int width_px = std::max(1, static_cast<int>(std::lround(camera.width_px / divisor)));
   const int height_px = std::max(1, static_cast<int>(std::lround(camera.height_px / divisor)));

@@ -44,20 +44,17 @@ struct NormalEquations {
   template <std::size_t kColumns>
   using Block = std::array<Column, kColumns>;
 
-  struct Pose {
+  template <std::size_t kSize>
+  struct Unknowns {
     Column gradient;
     Column diagonal;  ///< before the elimination
-    Block<6> with_camera;
+    Block<kSize> with_camera;
   };
+  using Pose = Unknowns<6>;
   struct Point {
     Lanes4 inverse[3] = {};  ///< of its own 3x3 block
     Lanes4 gradient{};       ///< before the elimination
     Block<3> with_camera;
-  };
-  struct Camera {
-    Column gradient;
-    Column diagonal;  ///< before the elimination
-    Block<kCamera> with_camera;
   };
 
   NormalEquations(const Bundle& bundle, int fixed, bool with_camera)
@@ -80,7 +77,7 @@ struct NormalEquations {
 
   int num_fixed_poses;
   bool has_camera;
-  Camera camera;
+  Unknowns<kCamera> camera;
   std::vector<Pose> poses;     ///< the free ones
   std::vector<Block<6>> H_pp;  ///< pose by pose, without the points (see index_of)
   std::vector<Point> points;

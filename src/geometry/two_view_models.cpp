@@ -77,79 +77,11 @@ constexpr double kMinRatio = 1.00001;
 /// Beyond, d2 is rounding and the matrix has rank 1.
 constexpr double kMaxRatio = 1e9;
 
-/// The 8 hypotheses share A = K^-1 H K = U diag(d1, d2, d3) V^T.
-struct FaugerasTerms {
-  Eigen::Matrix3d u;
-  Eigen::Matrix3d v;
-  double sign;  ///< det U det V
-  double d1;
-  double d2;
-  double d3;
-};
-
-/// Rotation about y of the case d' = +d2 and reflection of the case d' = -d2 (Faugeras & Lustman
-/// 1988, eq. 12 to 16); x1 and x3 are the signed parts of the plane's normal.
-Rigid3 planar_motion(const FaugerasTerms& f, double x1, double x3, bool d2_positive) {
-  const double side = d2_positive ? 1.0 : -1.0;
-  const double scale = (f.d1 + side * f.d3) * f.d2;
-  const double s = x1 * x3 * (f.d1 * f.d1 - f.d3 * f.d3) / scale;
-  const double c = (f.d1 * f.d3 + side * (f.d2 * f.d2)) / scale;
-  Eigen::Matrix3d rotation;
-  rotation << c, 0.0, -side * s, 0.0, side, 0.0, s, 0.0, side * c;
-  const Eigen::Vector3d translation(x1, 0.0, -side * x3);
-  return Rigid3::from_matrix(f.sign * f.u * rotation * f.v.transpose(),
-                             (f.u * translation).normalized());
-}
-
 /// Points with less parallax cannot vote on the depth sign.
 constexpr double kMaxCosParallax = 0.99998;
 /// Planar motions that accept so many of the best one's points are as likely. Between two frames of
 /// a drive the smaller turn is the likelier one.
 constexpr double kPlanarTieShare = 0.9;
-
-/// One motion's point test. Points are centred pixels (u - cx, v - cy), so that the optimal
-/// correction and its bound are pixels even where fx != fy.
-class PointJudge {
- public:
-  PointJudge(const Rigid3& cur_from_prev, const Camera& camera, double sigma_px)
-      : rotation_(cur_from_prev.rotation_matrix()),
-        translation_(cur_from_prev.translation),
-        center_(camera.cx_px, camera.cy_px),
-        inverse_focal_(1.0 / camera.fx_px, 1.0 / camera.fy_px),
-        max_squared_error_(4.0 * sigma_px * sigma_px) {
-    const Eigen::Vector3d scale(inverse_focal_.x(), inverse_focal_.y(), 1.0);
-    fundamental_ = scale.asDiagonal() * essential_from_motion(cur_from_prev) * scale.asDiagonal();
-  }
-
-  /// Cosine of the angle at which a good point sees the two cameras; nullopt: it is bad.
-  [[nodiscard]] std::optional<double> judge(const Eigen::Vector2d& prev_uv,
-                                            const Eigen::Vector2d& cur_uv) const {
-    const Eigen::Vector2d prev = prev_uv - center_;
-    const Eigen::Vector2d cur = cur_uv - center_;
-    const internal::CorrectedMatch match = internal::correct_match(fundamental_, prev, cur);
-    // Negated, so that NaN is bad.
-    if (!((match.prev - prev).squaredNorm() <= max_squared_error_) ||
-        !((match.cur - cur).squaredNorm() <= max_squared_error_)) {
-      return std::nullopt;
-    }
-    const internal::RayMeeting meeting =
-        internal::meet_rays(rotation_, translation_, match.prev.cwiseProduct(inverse_focal_),
-                            match.cur.cwiseProduct(inverse_focal_));
-    // A point in front of one camera and behind the other sees them under the opposite angle.
-    const bool opposite = meeting.finite && meeting.depth_prev * meeting.depth_cur < 0.0;
-    const double cos_parallax = opposite ? -meeting.cos_rays : meeting.cos_rays;
-    const bool in_front = meeting.finite && meeting.depth_prev > 0.0 && meeting.depth_cur > 0.0;
-    return cos_parallax >= kMaxCosParallax || in_front ? std::optional(cos_parallax) : std::nullopt;
-  }
-
- private:
-  Eigen::Matrix3d rotation_;
-  Eigen::Vector3d translation_;
-  Eigen::Vector2d center_;
-  Eigen::Vector2d inverse_focal_;
-  Eigen::Matrix3d fundamental_;
-  double max_squared_error_;
-};
 
 /// ORB-SLAM2 takes the 51st smallest cosine: a few wrong points cannot feign parallax.
 double robust_parallax_deg(std::vector<double>& cosines, int rank) {
@@ -205,15 +137,27 @@ std::vector<Rigid3> decompose_homography(const Eigen::Matrix3d& homography, cons
     return {};
   }
   const double sign = svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0 ? -1.0 : 1.0;
-  const FaugerasTerms f{svd.matrixU(), svd.matrixV(), sign, d(0), d(1), d(2)};
-  const double range = f.d1 * f.d1 - f.d3 * f.d3;
-  const double x1 = std::sqrt((f.d1 * f.d1 - f.d2 * f.d2) / range);
-  const double x3 = std::sqrt((f.d2 * f.d2 - f.d3 * f.d3) / range);
+  const double d1 = d(0);
+  const double d2 = d(1);
+  const double d3 = d(2);
+  const double range = d1 * d1 - d3 * d3;
+  const double most_x1 = std::sqrt((d1 * d1 - d2 * d2) / range);
+  const double most_x3 = std::sqrt((d2 * d2 - d3 * d3) / range);
   std::vector<Rigid3> hypotheses;
-  for (const bool d2_positive : {true, false}) {
-    for (const double sign1 : {1.0, -1.0}) {
-      for (const double sign3 : {1.0, -1.0}) {
-        hypotheses.push_back(planar_motion(f, sign1 * x1, sign3 * x3, d2_positive));
+  // The rotation about y of the case d' = +d2 (side 1) and the reflection of the case d' = -d2
+  // (Faugeras & Lustman 1988, eq. 12 to 16); x1 and x3 are the signed parts of the plane's normal.
+  for (const double side : {1.0, -1.0}) {
+    const double scale = (d1 + side * d3) * d2;
+    const double c = (d1 * d3 + side * (d2 * d2)) / scale;
+    for (const double x1 : {most_x1, -most_x1}) {
+      for (const double x3 : {most_x3, -most_x3}) {
+        const double s = x1 * x3 * range / scale;
+        Eigen::Matrix3d rotation;
+        rotation << c, 0.0, -side * s, 0.0, side, 0.0, s, 0.0, side * c;
+        const Eigen::Vector3d translation(x1, 0.0, -side * x3);
+        hypotheses.push_back(
+            Rigid3::from_matrix(sign * svd.matrixU() * rotation * svd.matrixV().transpose(),
+                                (svd.matrixU() * translation).normalized()));
       }
     }
   }
@@ -234,19 +178,41 @@ std::array<Rigid3, 4> decompose_essential(const Eigen::Matrix3d& essential) {
           Rigid3::from_matrix(first, -t), Rigid3::from_matrix(second, -t)};
 }
 
+// Points are centred pixels (u - cx, v - cy), so that the optimal correction and its bound are
+// pixels even where fx != fy.
 PointTest test_points(const Rigid3& cur_from_prev,
                       const PixelPairs& pairs,
                       const Camera& camera,
                       const PointTestOptions& options) {
-  const PointJudge point_judge(cur_from_prev, camera, options.sigma_px);
+  const Eigen::Matrix3d rotation = cur_from_prev.rotation_matrix();
+  const Eigen::Vector2d center(camera.cx_px, camera.cy_px);
+  const Eigen::Vector2d inverse_focal(1.0 / camera.fx_px, 1.0 / camera.fy_px);
+  const Eigen::Vector3d scale(inverse_focal.x(), inverse_focal.y(), 1.0);
+  const Eigen::Matrix3d fundamental =
+      scale.asDiagonal() * essential_from_motion(cur_from_prev) * scale.asDiagonal();
+  const double max_squared_error = 4.0 * options.sigma_px * options.sigma_px;
   PointTest result;
   result.good_mask.assign(pairs.size(), 0);
   std::vector<double> cosines;
   cosines.reserve(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const std::optional<double> cosine = point_judge.judge(pairs.prev_uv[i], pairs.cur_uv[i]);
-    if (cosine.has_value()) {
-      cosines.push_back(*cosine);
+    const Eigen::Vector2d prev = pairs.prev_uv[i] - center;
+    const Eigen::Vector2d cur = pairs.cur_uv[i] - center;
+    const internal::CorrectedMatch match = internal::correct_match(fundamental, prev, cur);
+    // Negated, so that NaN is bad.
+    if (!((match.prev - prev).squaredNorm() <= max_squared_error) ||
+        !((match.cur - cur).squaredNorm() <= max_squared_error)) {
+      continue;
+    }
+    const internal::RayMeeting meeting = internal::meet_rays(rotation, cur_from_prev.translation,
+                                                             match.prev.cwiseProduct(inverse_focal),
+                                                             match.cur.cwiseProduct(inverse_focal));
+    // A point in front of one camera and behind the other sees them under the opposite angle.
+    const bool opposite = meeting.finite && meeting.depth_prev * meeting.depth_cur < 0.0;
+    const double cos_parallax = opposite ? -meeting.cos_rays : meeting.cos_rays;
+    const bool in_front = meeting.finite && meeting.depth_prev > 0.0 && meeting.depth_cur > 0.0;
+    if (cos_parallax >= kMaxCosParallax || in_front) {
+      cosines.push_back(cos_parallax);
       result.good_mask[i] = 1;
     }
   }
@@ -287,9 +253,6 @@ std::optional<TwoViewMotion> best_motion(TwoViewModel model,
 }
 
 bool is_decisive(const TwoViewMotion& motion, int num_matches, const AcceptanceOptions& options) {
-  if (motion.model == TwoViewModel::kNone) {
-    return false;
-  }
   const double max_runner_up = motion.model == TwoViewModel::kHomography
                                    ? options.max_runner_up_homography
                                    : options.max_runner_up_essential;

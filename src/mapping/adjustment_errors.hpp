@@ -39,13 +39,10 @@ struct AdjustedPoint {
   Rigid3 map_from_anchor;
   std::array<double, 3> at = {};
 
-  /// Homogeneous.
-  [[nodiscard]] Eigen::Vector4d in_map() const {
-    Eigen::Vector4d point;
-    point << map_from_anchor.rotation * Eigen::Vector3d(at[0], at[1], 1.0) +
-                 at[2] * map_from_anchor.translation,
-        at[2];
-    return point;
+  [[nodiscard]] Eigen::Vector3d in_map() const {
+    const Eigen::Vector3d scaled = map_from_anchor.rotation * Eigen::Vector3d(at[0], at[1], 1.0) +
+                                   at[2] * map_from_anchor.translation;
+    return scaled / at[2];
   }
 };
 

@@ -37,12 +37,6 @@ constexpr int kMaxClusters = 40;
 /// Clusters are alike, too, where the motion stays the same.
 constexpr double kLikeErrors = 2.0;
 
-auto distance_from_first(const KeptMap& map) {
-  return [&map](const Similarity3& at) {
-    return (at.translation - map.map_from_keyframe.front().translation).norm();
-  };
-}
-
 ceres::Problem::Options shared_losses() {
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -96,11 +90,6 @@ class Adjustment {
   }
 
  private:
-  struct Corner {
-    const CornerError* error;
-    std::array<const double*, 3> at;
-  };
-
   [[nodiscard]] const Camera& base_camera(int keyframe) const {
     return keyframe < options_.num_of_other_camera ? map_.keyframes[slot(keyframe)].camera
                                                    : options_.camera;
@@ -147,11 +136,10 @@ class Adjustment {
         AdjustedPose& pose = poses_[slot(view.keyframe)];
         auto* error = new CornerError(frame_uv(view), base_camera(view.keyframe), points_[i], pose,
                                       sigma_px_);
-        double* camera = camera_change(view.keyframe);
-        residuals_.push_back({problem_.AddResidualBlock(error, &corner_loss_, points_[i].at.data(),
-                                                        pose.delta.data(), camera),
-                              tracks_[i].front().keyframe * num_clusters / num_keyframes});
-        corners_.push_back({error, {points_[i].at.data(), pose.delta.data(), camera}});
+        residuals_.push_back(
+            {problem_.AddResidualBlock(error, &corner_loss_, points_[i].at.data(),
+                                       pose.delta.data(), camera_change(view.keyframe)),
+             tracks_[i].front().keyframe * num_clusters / num_keyframes});
       }
     }
   }
@@ -199,11 +187,13 @@ class Adjustment {
     }
     if (map_.lengths.empty()) {
       // Any length, so that there is a scale.
-      const auto far =
-          std::ranges::max_element(map_.map_from_keyframe, {}, distance_from_first(map_));
-      if (const double distance = distance_from_first(map_)(*far); distance > 0.0) {
-        add_distance(0, static_cast<int>(far - map_.map_from_keyframe.begin()), std::log(distance),
-                     1e-3);
+      const std::vector<Similarity3>& at = map_.map_from_keyframe;
+      const auto distance_from_first = [&](const Similarity3& other) {
+        return (other.translation - at.front().translation).norm();
+      };
+      const auto far = std::ranges::max_element(at, {}, distance_from_first);
+      if (const double distance = distance_from_first(*far); distance > 0.0) {
+        add_distance(0, static_cast<int>(far - at.begin()), std::log(distance), 1e-3);
       }
     }
   }
@@ -240,11 +230,14 @@ class Adjustment {
 
   void measure_errors(double sigma_factor) {
     std::vector<double> errors;
-    errors.reserve(corners_.size());
-    for (const Corner& corner : corners_) {
-      Eigen::Vector2d error;
-      corner.error->Evaluate(corner.at.data(), error.data(), nullptr);
-      errors.push_back(sigma_px_ * error.norm());
+    errors.reserve(residuals_.size());
+    for (const ClusteredResidual& residual : residuals_) {
+      if (residual.cluster >= 0) {  // a corner's
+        Eigen::Vector2d error;
+        double cost = 0.0;
+        problem_.EvaluateResidualBlock(residual.block, false, &cost, error.data(), nullptr);
+        errors.push_back(sigma_px_ * error.norm());
+      }
     }
     median_error_px_ = median(std::move(errors));
     sigma_px_ = sigma_factor * std::max(median_error_px_ / kMedianOfRayleigh, kMinSigma_px);
@@ -282,19 +275,8 @@ class Adjustment {
   void read_landmarks(MapAdjustment& result) const {
     for (std::size_t i = 0; i < points_.size(); ++i) {
       AdjustedLandmark& landmark = result.landmarks.emplace_back();
-      landmark.in_map = points_[i].in_map().hnormalized();
+      landmark.in_map = points_[i].in_map();
       landmark.views = tracks_[i];
-      const auto ray_from = [&](const MapView& view) -> Eigen::Vector3d {
-        const Rigid3 map_from_camera = poses_[slot(view.keyframe)].camera_from_map().inverse();
-        const Eigen::Vector4d at = points_[i].in_map();
-        return (at.head<3>() - at.w() * map_from_camera.translation).normalized();
-      };
-      const Eigen::Vector3d first = ray_from(tracks_[i].front());
-      for (const MapView& view : tracks_[i]) {
-        const Eigen::Vector3d other = ray_from(view);
-        landmark.max_parallax_rad = std::max(
-            landmark.max_parallax_rad, std::atan2(first.cross(other).norm(), first.dot(other)));
-      }
     }
   }
 
@@ -349,7 +331,6 @@ class Adjustment {
   std::array<double, 6> no_change_ = {};  ///< of other recordings' cameras
   double median_error_px_ = 0.0;
   double sigma_px_ = 1.0;
-  std::vector<Corner> corners_;
   std::vector<ClusteredResidual> residuals_;
   ceres::LossFunctionWrapper corner_loss_{nullptr, ceres::TAKE_OWNERSHIP};
   ceres::CauchyLoss loop_loss_{kLooseLoop};

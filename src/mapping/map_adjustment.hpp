@@ -31,7 +31,6 @@ struct MapAdjustmentOptions {
 /// A landmark, and who sees it.
 struct AdjustedLandmark {
   Eigen::Vector3d in_map = Eigen::Vector3d::Zero();
-  double max_parallax_rad = 0.0;  ///< between its first view and any other
   MapTrack views;
 };
 

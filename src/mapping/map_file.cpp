@@ -306,11 +306,8 @@ Status write_map_file(const std::filesystem::path& file, MapFile map) {
 }
 
 Expected<MapFile> read_map_file(const std::filesystem::path& file) {
-  const Expected<std::string> bytes = read_text_file(file, kMaxMap_MB);
-  if (!bytes) {
-    return bytes.error();
-  }
-  Expected<MapFile> map = unseal(*bytes).and_then(parse);
+  STEMVO_TRY_GET(const std::string bytes, read_text_file(file, kMaxMap_MB));
+  Expected<MapFile> map = unseal(bytes).and_then(parse);
   return map ? std::move(map) : fail(fmt::format("{}: {}", file.string(), map.error().message));
 }
 

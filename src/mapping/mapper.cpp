@@ -8,6 +8,7 @@
 #include "geometry/median.hpp"
 #include "mapping/descriptors.hpp"
 #include "mapping/pose_graph.hpp"
+#include "odometry/tracks.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -35,12 +36,11 @@ constexpr double kAlikeErrors = 2.0;
 constexpr double kMinLogScale = 0.005;
 
 std::vector<KeptCorner> corners_of(const Matches& matches) {
-  std::vector<KeptCorner> corners(matches.cur_uv.size());
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    corners[i].track_id = matches.track_ids[i];
-    corners[i].uv = matches.cur_uv[i].cast<float>();
+  std::vector<KeptCorner> corners;
+  for (const Observation& point :
+       current_points(matches, std::vector<char>(matches.cur_uv.size(), 1))) {
+    corners.push_back({point.track_id, point.uv.cast<float>()});
   }
-  std::ranges::sort(corners, {}, &KeptCorner::track_id);
   return corners;
 }
 

@@ -291,7 +291,7 @@ std::optional<Expectation> expect_by_places(const Camera& camera,
       Expectation::kBySighting_rad, false};
 }
 
-std::optional<PlacePose> locate_in_place(const PlaceView& old, const PlaceView& frame) {
+std::optional<LocatedFrame> locate_in_place(const PlaceView& old, const PlaceView& frame) {
   auto found = find_consensus(old, frame, match_descriptors(old.descriptors, frame.descriptors));
   if (!found.has_value()) {
     return std::nullopt;
@@ -302,7 +302,11 @@ std::optional<PlacePose> locate_in_place(const PlaceView& old, const PlaceView& 
   if (!found.has_value() || !is_enough(frame, found->inliers, {})) {
     return std::nullopt;
   }
-  return PlacePose{found->by_from_of.inverse(), std::move(found->inliers)};
+  LocatedFrame located{-1, found->by_from_of.inverse(), {}};
+  for (const auto& [mine, other] : found->inliers) {
+    located.landmarks.emplace_back(corner_of(frame, other).track_id, landmark_of(old, mine));
+  }
+  return located;
 }
 
 std::optional<Loop> check_place(const PlaceView& old,

@@ -3,7 +3,10 @@
 
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "mapping/descriptors.hpp"
 #include "mapping/kept_map.hpp"
@@ -19,17 +22,19 @@ struct PlaceView {
   std::span<const Descriptor> descriptors;
 };
 
-/// Where the camera of a frame stood in an old keyframe.
-struct PlacePose {
-  Rigid3 old_from_camera;               ///< in the old keyframe's unit
-  std::vector<DescriptorPair> corners;  ///< of the old keyframe, of the frame: inliers
+/// A lost frame, found.
+struct LocatedFrame {
+  int keyframe = 0;             ///< the old one's number in the map
+  Rigid3 keyframe_from_camera;  ///< in the old one's unit
+  /// A track of the frame, and its landmark in the old keyframe's camera.
+  std::vector<std::pair<int, Eigen::Vector3d>> landmarks;
 };
 
 /// Pose of a frame by the landmarks of an old keyframe that its descriptors find: consensus of
-/// samples of three (P3P) from a fixed seed, refined. nullopt: fewer than 30 agree, or they lie in
-/// a small part of the image.
-[[nodiscard]] std::optional<PlacePose> locate_in_place(const PlaceView& old,
-                                                       const PlaceView& frame);
+/// samples of three (P3P) from a fixed seed, refined. The result's `keyframe` is not set. nullopt:
+/// fewer than 30 agree, or they lie in a small part of the image.
+[[nodiscard]] std::optional<LocatedFrame> locate_in_place(const PlaceView& old,
+                                                          const PlaceView& frame);
 
 /// Where a new keyframe should lie to an old one.
 struct Expectation {

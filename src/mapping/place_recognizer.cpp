@@ -298,8 +298,9 @@ std::optional<Expectation> PlaceRecognizer::look_around(const Question& question
 std::optional<Sighting> PlaceRecognizer::look_at(const Question& question, const Look& look) const {
   const auto& [map, components, number, keyframe] = question;
   const KeptKeyframe& old = keyframe_of(map, look.place);
-  if (!is_far(question, look.place) || (num_shared(track_ids_of(old), last_tracks_) > kMaxTracks &&
-                                        !has_come_back(map, place_of(look.place), number))) {
+  if (!is_far(question, look.place) ||
+      (num_shared(track_ids_of(old), last_tracks_) > kMaxTracks &&
+       !has_come_back(map, places_around(look.place, 0).front(), number))) {
     return std::nullopt;
   }
   const PlaceView recent{keyframe.camera, keyframe.corners, look.seen};
@@ -352,11 +353,12 @@ std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
   const auto look_for_pose = [&](const Look& look) -> std::optional<std::vector<Look>> {
     std::vector<Look> others;
     const KeptKeyframe& old = keyframe_of(map, look.place);
-    const auto found = locate_in_place(view_of(old), {camera, corners, look.seen});
+    auto found = locate_in_place(view_of(old), {camera, corners, look.seen});
     if (!found.has_value()) {
       return others;
     }
-    const Similarity3 map_from_camera = map.pose(look.place) * Similarity3(found->old_from_camera);
+    const Similarity3 map_from_camera =
+        map.pose(look.place) * Similarity3(found->keyframe_from_camera);
     const auto is_near = [&](double max_turn_rad, double max_shift) {
       return [&, max_turn_rad, max_shift](const Similarity3& other) {
         const Similarity3 difference = map_from_camera.inverse() * other;
@@ -374,11 +376,8 @@ std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
       }
       return others;
     }
-    located = {look.place, found->old_from_camera, {}};
-    for (const auto& [mine, other] : found->corners) {
-      located->landmarks.emplace_back(corners[slot(other)].track_id,
-                                      old.corners[slot(mine)].in_camera.cast<double>());
-    }
+    located = std::move(found);
+    located->keyframe = look.place;
     return std::nullopt;
   };
   look_through(look_alikes(described, true, [](int) { return true; }), look_for_pose);

@@ -6,10 +6,7 @@
 #include <functional>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "mapping/descriptors.hpp"
 #include "mapping/kept_map.hpp"
@@ -19,14 +16,6 @@
 #include "stemvo/rigid3.hpp"
 
 namespace stemvo {
-
-/// A lost frame, found.
-struct LocatedFrame {
-  int keyframe = 0;             ///< the old one's number in the map
-  Rigid3 keyframe_from_camera;  ///< in the old one's unit
-  /// A track of the frame, and its landmark in the old keyframe's camera.
-  std::vector<std::pair<int, Eigen::Vector3d>> landmarks;
-};
 
 /// Tells which keyframe shows a kept place. A check of one pair may be wrong where things repeat: a
 /// place counts once another pair, of a neighbouring place or of the keyframes before, says the
@@ -111,9 +100,6 @@ class PlaceRecognizer {
   [[nodiscard]] std::vector<Look> expected_looks(const Question& question,
                                                  LookDescriptors& described);
   void begin_lookup(const KeptKeyframe& keyframe);
-  [[nodiscard]] const Place& place_of(int keyframe) const {
-    return *std::ranges::lower_bound(places_, keyframe, {}, &Place::keyframe);
-  }
   /// The window remembers places just before in its own map.
   [[nodiscard]] bool is_far(const Question& question, int place) const {
     return place < end_of_far() || question.is_elsewhere(place);

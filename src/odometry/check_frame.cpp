@@ -14,27 +14,12 @@
 namespace stemvo {
 namespace {
 
-Status check_image(const cv::Mat& image, PixelOrder order, const Camera& camera) {
-  if (image.cols != camera.width_px || image.rows != camera.height_px) {
-    return fail(fmt::format("image: expected {}x{} pixels, as the camera has, found {}x{}",
-                            camera.width_px, camera.height_px, image.cols, image.rows));
-  }
-  const int channels = order == PixelOrder::kGray ? 1 : 3;
-  if (image.type() != CV_MAKETYPE(CV_8U, channels)) {
-    return fail(fmt::format("image: expected {} channel{} of 8 bit, found OpenCV's type {}",
-                            channels, channels == 1 ? "" : "s", cv::typeToString(image.type())));
-  }
-  return {};
-}
-
-Status check_time(double time_s, std::optional<double> last_s) {
-  constexpr double kMax_s = 1e11;  // 3,000 years: those since 1970 in another unit are above it
-  if (!(std::abs(time_s) <= kMax_s) || (last_s && time_s <= *last_s)) {
-    return fail(fmt::format("time: expected {}, found {} s",
-                            last_s && time_s <= *last_s
-                                ? fmt::format("one after the last frame's, {} s", *last_s)
-                                : fmt::format("a finite number of seconds up to {:g}", kMax_s),
-                            time_s));
+Status check_pixels(const char* name, const cv::Mat& pixels, int type, const Camera& camera) {
+  const cv::Size size(camera.width_px, camera.height_px);
+  if (pixels.size() != size || pixels.type() != type) {
+    return fail(fmt::format("{}: expected {}x{} pixels of {}, found {}x{} of {}", name, size.width,
+                            size.height, cv::typeToString(type), pixels.cols, pixels.rows,
+                            cv::typeToString(pixels.type())));
   }
   return {};
 }
@@ -118,16 +103,12 @@ Status check_camera(const Camera& camera, const std::string& owner) {
 std::string doubt_of(const Camera& camera) {
   constexpr double kMaxOff = 0.15;
   constexpr double kMinView_deg = 10.0;
-  if (view_deg_of(camera) < kMinView_deg) {
-    return fmt::format("a field of view of {:.1f} degrees is small: is the focal length in pixels?",
-                       view_deg_of(camera));
-  }
-  constexpr double kMaxView_deg = 130.0;
-  if (view_deg_of(camera) > kMaxView_deg && camera.distortion != Distortion::kEquidistant) {
-    return fmt::format(
-        "a field of view of {:.0f} degrees is large for a lens that is no fisheye: "
-        "is the focal length in pixels?",
-        view_deg_of(camera));
+  constexpr double kMaxView_deg = 130.0;  // of a lens that is no fisheye
+  const double view_deg = view_deg_of(camera);
+  const bool is_large = view_deg > kMaxView_deg && camera.distortion != Distortion::kEquidistant;
+  if (view_deg < kMinView_deg || is_large) {
+    return fmt::format("a field of view of {:.1f} degrees is {}: is the focal length in pixels?",
+                       view_deg, is_large ? "large for a lens that is no fisheye" : "small");
   }
   constexpr double kMaxRatio = 1.2;
   const double ratio = camera.fx_px / camera.fy_px;
@@ -148,13 +129,23 @@ std::string doubt_of(const Camera& camera) {
       scale == 1.0 ? "another size" : fmt::format("images about {:.2g} times as large", scale));
 }
 
-Status check_mask(const cv::Mat& mask, const Camera& camera) {
-  const cv::Size size(camera.width_px, camera.height_px);
-  if (!mask.empty() && (mask.size() != size || mask.type() != CV_8UC1)) {
-    return fail(fmt::format("mask: expected {}x{} pixels of CV_8UC1, found {}x{} of {}", size.width,
-                            size.height, mask.cols, mask.rows, cv::typeToString(mask.type())));
+Status check_time(const std::string& name,
+                  double time_s,
+                  std::optional<double> last_s,
+                  const std::string& of_last) {
+  constexpr double kMax_s = 1e11;  // 3,000 years: those since 1970 in another unit are above it
+  const bool is_late = last_s && time_s <= *last_s;
+  if (std::abs(time_s) <= kMax_s && !is_late) {
+    return {};
   }
-  return {};
+  return fail(fmt::format("{}: expected {}, found {} s", name,
+                          is_late ? fmt::format("one after the last {}'s, {} s", of_last, *last_s)
+                                  : fmt::format("a finite number of seconds up to {:g}", kMax_s),
+                          time_s));
+}
+
+Status check_mask(const cv::Mat& mask, const Camera& camera) {
+  return mask.empty() ? Status() : check_pixels("mask", mask, CV_8UC1, camera);
 }
 
 cv::Mat rgb_of(const cv::Mat& image, PixelOrder order) {
@@ -170,8 +161,9 @@ Status FrameCheck::admit(const cv::Mat& image,
                          PixelOrder order,
                          double time_s,
                          const FrameHints& hints) {
-  STEMVO_TRY(check_image(image, order, camera_));
-  STEMVO_TRY(check_time(time_s, last_time_s_));
+  const int type = order == PixelOrder::kGray ? CV_8UC1 : CV_8UC3;
+  STEMVO_TRY(check_pixels("image", image, type, camera_));
+  STEMVO_TRY(check_time("time", time_s, last_time_s_, "frame"));
   STEMVO_TRY(check_mask(hints.mask, camera_));
   STEMVO_TRY(check_rotation(hints.prev_from_cur));
   last_time_s_ = time_s;

@@ -19,6 +19,12 @@ namespace stemvo {
 /// Says what is odd about a camera that may be right; empty: nothing.
 [[nodiscard]] std::string doubt_of(const Camera& camera);
 
+/// Error: a time that is not finite, or not after the last one, which something of this name has.
+[[nodiscard]] Status check_time(const std::string& name,
+                                double time_s,
+                                std::optional<double> last_s,
+                                const std::string& of_last);
+
 /// Error: a mask that is neither empty nor CV_8UC1 of the camera's size.
 [[nodiscard]] Status check_mask(const cv::Mat& mask, const Camera& camera);
 

@@ -4,18 +4,15 @@
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/distortion.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 
 Expected<FrameView> FrameView::create(const Camera& camera) {
   const Camera working = working_camera(camera);
-  const Expected<Camera> undistorted = undistorted_camera(working);
-  if (!undistorted) {
-    return undistorted.error();
-  }
   FrameView view;
   view.full_size_ = {camera.width_px, camera.height_px};
-  view.camera_ = *undistorted;
+  STEMVO_TRY_GET(view.camera_, undistorted_camera(working));
   if (!is_distorted(working)) {
     return view;
   }

@@ -80,8 +80,7 @@ void refine(std::vector<Hypothesis>& hypotheses,
     hypothesis.cur_from_prev = refined.cur_from_prev;
     hypothesis.cost = refined.cost;
   }
-  std::sort(hypotheses.begin(), hypotheses.end(),
-            [](const Hypothesis& a, const Hypothesis& b) { return a.cost < b.cost; });
+  std::ranges::sort(hypotheses, {}, &Hypothesis::cost);
 }
 
 /// Flags of tracks as flags of matches; `otherwise`: that of a match which is no such track.
@@ -139,7 +138,6 @@ MeasuredMotion Initializer::measure_world(const PixelPairs& pairs, const Camera&
     world.is_decisive = world.is_decisive && !rivals->is_contested;
   }
   world.inlier_mask = scatter(world.inlier_mask, rivals->world_party);
-  world.moving_mask = std::move(rivals->moving_mask);
   return std::move(world);
 }
 
@@ -178,9 +176,9 @@ std::optional<Window> Initializer::open_window(const View& now,
                                                const Camera& camera,
                                                const WindowOptions& window_options) const {
   Window window;
-  add_keyframe(window, {reference_.frame, reference_.world_from_camera, reference_.points},
-               window_options);
-  add_keyframe(window, {now.frame, now.world_from_camera, now.points}, window_options);
+  for (const View* view : {&reference_, &now}) {
+    window.keyframes.push_back({view->frame, view->world_from_camera, view->points});
+  }
   triangulate_landmarks(window, camera, window_options);
   if (static_cast<int>(window.landmarks.size()) < kMinLandmarks) {
     return std::nullopt;

@@ -15,24 +15,16 @@ namespace {
 
 constexpr std::size_t kMinTurnLandmarks = 10;
 
-std::vector<char> find_inliers(const SeenLandmarks& seen,
-                               const Rigid3& camera_from_world,
-                               const Camera& camera,
-                               double bound_px) {
-  std::vector<char> mask(seen.points.size());
-  for (std::size_t i = 0; i < mask.size(); ++i) {
-    mask[i] = is_near(camera_from_world, seen.points[i], seen.uv[i], camera, bound_px) ? 1 : 0;
-  }
-  return mask;
-}
-
 std::optional<Localization> optimize_pose(const SeenLandmarks& seen,
                                           const Rigid3& start_camera_from_world,
                                           const Camera& camera,
                                           const LocalizationOptions& options) {
   const Rigid3 first = refine_absolute_pose(start_camera_from_world, seen.points, seen.uv, camera,
                                             {.loss_scale_px = options.first_loss_px});
-  const std::vector<char> mask = find_inliers(seen, first, camera, 2.0 * options.inlier_bound_px);
+  std::vector<char> mask;
+  for (const double distance_px : distances_px(seen, first, camera)) {
+    mask.push_back(distance_px <= 2.0 * options.inlier_bound_px ? 1 : 0);
+  }
   const SeenLandmarks near = select(seen, mask);
   if (near.size() < options.min_landmarks) {
     return std::nullopt;
@@ -40,9 +32,9 @@ std::optional<Localization> optimize_pose(const SeenLandmarks& seen,
   const Rigid3 second =
       refine_absolute_pose(first, near.points, near.uv, camera, {.loss_scale_px = options.loss_px});
   const auto count = [&](const SeenLandmarks& landmarks) {
-    const std::vector<char> inliers =
-        find_inliers(landmarks, second, camera, options.inlier_bound_px);
-    return static_cast<int>(std::count(inliers.begin(), inliers.end(), char{1}));
+    const std::vector<double> distances = distances_px(landmarks, second, camera);
+    const auto is_inlier = [&](double px) { return px <= options.inlier_bound_px; };
+    return static_cast<int>(std::ranges::count_if(distances, is_inlier));
   };
   if (count(near) < options.min_landmarks) {
     return std::nullopt;
@@ -85,9 +77,8 @@ Observations project_lost_landmarks(const Window& window,
 }
 
 std::vector<double> distances_px(const SeenLandmarks& seen,
-                                 const Rigid3& world_from_camera,
+                                 const Rigid3& camera_from_world,
                                  const Camera& camera) {
-  const Rigid3 camera_from_world = world_from_camera.inverse();
   std::vector<double> distances;
   for (std::size_t i = 0; i < seen.points.size(); ++i) {
     const Eigen::Vector3d point = camera_from_world * seen.points[i];
@@ -101,9 +92,10 @@ Rigid3 nearer_pose(const Rigid3& first,
                    const Rigid3& second,
                    const SeenLandmarks& seen,
                    const Camera& camera) {
-  return median(distances_px(seen, second, camera)) < median(distances_px(seen, first, camera))
-             ? second
-             : first;
+  const auto distance_px = [&](const Rigid3& world_from_camera) {
+    return median(distances_px(seen, world_from_camera.inverse(), camera));
+  };
+  return distance_px(second) < distance_px(first) ? second : first;
 }
 
 std::optional<Localization> localize(const SeenLandmarks& seen,

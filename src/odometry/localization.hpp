@@ -33,7 +33,7 @@ struct SeenLandmarks {
 
 /// How far from where the camera has each landmark it is seen, px; infinite: behind it.
 [[nodiscard]] std::vector<double> distances_px(const SeenLandmarks& seen,
-                                               const Rigid3& world_from_camera,
+                                               const Rigid3& camera_from_world,
                                                const Camera& camera);
 
 /// Which of two world_from_camera the landmarks fit better, by the median of their distances to

@@ -101,7 +101,10 @@ MotionModel::Fused MotionModel::fuse(const Rigid3& measured,
   if (!is_fused_) {  // the velocity is the difference of two poses
     covariance_ << noise, noise / t, noise / t, 2.0 / (t * t) * noise;
   }
-  advance(t);
+  // The prediction's error; pushes come on top.
+  Matrix12d step = Matrix12d::Identity();
+  step.topRightCorner<6, 6>().diagonal().setConstant(t);
+  covariance_ = step * covariance_ * step.transpose();
   const Rigid3 predicted = predict(t);
   const Vector6d off = six_of(predicted.inverse() * held.prev_from_cur);
   learn(off, noise, t);

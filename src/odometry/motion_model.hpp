@@ -90,12 +90,6 @@ class MotionModel {
 
  private:
   using Matrix12d = Eigen::Matrix<double, 12, 12>;
-  /// The prediction's error; pushes come on top.
-  void advance(double interval_s) {
-    Matrix12d step = Matrix12d::Identity();
-    step.topRightCorner<6, 6>().diagonal().setConstant(interval_s);
-    covariance_ = step * covariance_ * step.transpose();
-  }
   void learn(const Vector6d& off, const Matrix6d& noise, double interval_s);
 
   Vector6d velocity_ = Vector6d::Zero();  ///< per second

@@ -2,7 +2,6 @@
 #include "odometry/moving_things.hpp"
 
 #include <functional>
-#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -50,13 +49,6 @@ constexpr double kExplains = 0.75;
 /// Depth counts so many times.
 constexpr double kDepthWeight = 2.0;
 
-std::vector<char> inverted(std::vector<char> mask) {
-  for (char& flag : mask) {
-    flag = flag != 0 ? 0 : 1;
-  }
-  return mask;
-}
-
 MeasuredMotion measure_party(const std::vector<char>& party,
                              const PixelPairs& pairs,
                              const Camera& camera,
@@ -94,12 +86,12 @@ double cell_votes(std::span<const Eigen::Vector2d> uv, const std::vector<char>& 
   return votes;
 }
 
-std::vector<double> cell_shares(std::span<const Eigen::Vector2d> uv,
-                                const std::vector<char>& agrees) {
-  std::vector<double> shares;
-  std::ranges::transform(Cells(uv, agrees).of_point, std::back_inserter(shares),
-                         [](const auto* cell) { return cell->share(); });
-  return shares;
+std::vector<char> without(const std::vector<char>& some, const std::vector<char>& mask) {
+  std::vector<char> rest(mask.size());
+  std::ranges::transform(mask, some, rest.begin(), [](char is_kept, char is_one) {
+    return static_cast<char>(is_kept != 0 && is_one == 0);
+  });
+  return rest;
 }
 
 std::vector<char> scatter(const std::vector<char>& flags, const std::vector<char>& party) {
@@ -121,7 +113,7 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
   }
   const std::vector<char> plane =
       score_homography(*all.homography, pairs, options.sigma_px).inlier_mask;
-  const std::vector<char> rest = inverted(plane);
+  const std::vector<char> rest = without(plane, std::vector<char>(plane.size(), 1));
   const auto votes = [&](const std::vector<char>& agrees) {
     return cell_votes(pairs.cur_uv, agrees);
   };
@@ -144,7 +136,8 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
   }
   const bool has_depth = other.homography_ratio <= options.homography_ratio;
   if ((has_depth ? kDepthWeight : 1.0) * other_votes > plane_votes) {
-    return MotionRivals{std::move(other), rest, plane, false};
+    other.moving_mask = plane;
+    return MotionRivals{std::move(other), rest, false};
   }
   MeasuredMotion world = measure_party(plane, pairs, camera, estimator);
   if (world.state == FrameState::kLost) {
@@ -152,7 +145,8 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
   }
   // The other one's depth may yet show.
   const bool is_contested = kDepthWeight * other_votes > plane_votes;
-  return MotionRivals{std::move(world), plane, std::move(other_mask), is_contested};
+  world.moving_mask = std::move(other_mask);
+  return MotionRivals{std::move(world), plane, is_contested};
 }
 
 void MovingTracks::add(const Matches& matches, const std::vector<char>& moving_mask) {
@@ -175,10 +169,11 @@ void MovingTracks::observe(const Matches& matches, const std::vector<char>& fits
   const std::vector<char> fits_thing =
       score_homography(*motion, {matches.prev_uv, matches.cur_uv}, options_.inlier_threshold_px)
           .inlier_mask;
-  const std::vector<double> shares = cell_shares(matches.cur_uv, moving);
+  const Cells cells(matches.cur_uv, moving);
   for (std::size_t i = 0; i < moving.size(); ++i) {
     const int vote = (fits_thing[i] != 0 ? 1 : 0) - (fits_world[i] != 0 ? 1 : 0);
-    const bool joins = fits_thing[i] != 0 && (fits_world[i] == 0 || shares[i] > 0.5);
+    const bool joins =
+        fits_thing[i] != 0 && (fits_world[i] == 0 || cells.of_point[i]->share() > 0.5);
     const int evidence = moving[i] != 0
                              ? std::min(before[matches.track_ids[i]] + vote, kMostEvidence)
                              : (joins ? kFirstEvidence : 0);

@@ -25,16 +25,15 @@ namespace stemvo {
 [[nodiscard]] double cell_votes(std::span<const Eigen::Vector2d> uv,
                                 const std::vector<char>& agrees);
 
-/// For each point the share of its cell's points that agree.
-[[nodiscard]] std::vector<double> cell_shares(std::span<const Eigen::Vector2d> uv,
-                                              const std::vector<char>& agrees);
+/// The flags of a mask but for some.
+[[nodiscard]] std::vector<char> without(const std::vector<char>& some,
+                                        const std::vector<char>& mask);
 
 /// Two motions that exclude each other, each with matches of its own: the camera's through the
 /// world, and a thing's that moves by itself.
 struct MotionRivals {
-  MeasuredMotion world;           ///< its mask is one per match of `world_party`
+  MeasuredMotion world;           ///< its inlier_mask is one per match of `world_party`
   std::vector<char> world_party;  ///< one per match: the world's motion was measured on it
-  std::vector<char> moving_mask;  ///< one per match: it moves as the thing does
   bool is_contested = false;      ///< later frames may tell that the thing is the world
 };
 
@@ -75,12 +74,6 @@ class MovingTracks {
       return static_cast<char>(evidence_.contains(track_id));
     });
     return mask;
-  }
-  /// Clears their flags in a mask, one per match.
-  void leave_out(const Matches& matches, std::vector<char>& mask) const {
-    for (std::size_t i = 0; i < mask.size(); ++i) {
-      mask[i] = evidence_.contains(matches.track_ids[i]) ? char{0} : mask[i];
-    }
   }
 
  private:

@@ -256,7 +256,7 @@ Expected<AdjustedMap> OdometryHandle::adjust_map(const std::vector<int>& covaria
 Status OdometryHandle::save_map(const std::filesystem::path& file) const {
   STEMVO_TRY(check_in_use(impl_));
   STEMVO_TRY_GET(const WholeMap map, impl_->adjusted_map(file.string(), {}));
-  return impl_->odometry.save_map(file, map);
+  return impl_->odometry.save_map(file, map.kept);
 }
 
 Status OdometryHandle::load_map(const std::filesystem::path& file) {
@@ -282,9 +282,7 @@ Expected<FrameResult> Odometry::process(const cv::Mat& image,
   if (impl_->loops.has_thrown()) {
     impl_->loops.finish();  // throws it
   }
-  if (!status) {
-    return status.error();
-  }
+  STEMVO_TRY(status);
   return *impl_->take();
 }
 

@@ -95,16 +95,16 @@ class FrameLoops {
   }
   void optimize() {
     for (std::size_t k = 0; wait(k, [&] { return k < num_localized_; }); ++k) {
-      if (!stages_.optimize(k)) {
-        stop(nullptr);
-      }
-      advance(num_optimized_);
+      end_frame(k);
     }
   }
   void take_through(std::size_t k) {
     stages_.prepare(k);
     stages_.track(k);
     stages_.localize(k);
+    end_frame(k);
+  }
+  void end_frame(std::size_t k) {
     if (!stages_.optimize(k)) {
       stop(nullptr);
     }

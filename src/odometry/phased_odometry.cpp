@@ -4,10 +4,8 @@
 #include <opencv2/core/utility.hpp>
 
 #include "internal_check.hpp"
-#include "mapping/map_file.hpp"
 #include "odometry/check_frame.hpp"
 #include "odometry/frame_clock.hpp"
-#include "odometry/whole_map.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
 #include "try.hpp"
@@ -32,9 +30,7 @@ Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
   const cv::Mat blank(seen.height_px, seen.width_px, CV_8UC1, cv::Scalar(0));
   const int zoom = stem.frame_zoom(
       choose_tracking_resolution(options.stem.tracking_resolution, options.features.method, seen));
-  if (const Expected<Channel> channel = stem.apply(blank, zoom); !channel) {
-    return channel.error();
-  }
+  STEMVO_TRY(stem.apply(blank, zoom));
   return PhasedOdometry(options, *view, mask, std::move(stem), zoom);
 }
 
@@ -71,10 +67,6 @@ Status PhasedOdometry::check_remembers(const std::string& asked) const {
              ? Status()
              : fail(fmt::format("{}: expected odometry.mode map with odometry.loops true, found {}",
                                 asked, is_map ? "loops false" : "mode two_frame"));
-}
-
-Status PhasedOdometry::save_map(const std::filesystem::path& file, const WholeMap& map) const {
-  return write_map_file(file, {channel_name(), map.kept});
 }
 
 Status PhasedOdometry::load_map(const std::filesystem::path& file) {

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
 
+#include "mapping/map_file.hpp"
 #include "odometry/channel_odometry.hpp"
 #include "odometry/frame_view.hpp"
 #include "stem/stem.hpp"
@@ -17,8 +18,6 @@
 #include "stemvo/options.hpp"
 
 namespace stemvo {
-
-struct WholeMap;
 
 /// Odometry::process in four phases that can work on three frames at a time; the results are the
 /// same.
@@ -45,7 +44,9 @@ class PhasedOdometry {
 
   /// Error: it remembers nothing (odometry.mode two_frame, odometry.loops off). `asked`: for what.
   [[nodiscard]] Status check_remembers(const std::string& asked) const;
-  [[nodiscard]] Status save_map(const std::filesystem::path& file, const WholeMap& map) const;
+  [[nodiscard]] Status save_map(const std::filesystem::path& file, const KeptMap& map) const {
+    return write_map_file(file, {channel_name(), map});
+  }
   /// The frames that come may recognize what it shows; none has come yet. Errors: as
   /// check_remembers; the file cannot be read, or is of another channel.
   [[nodiscard]] Status load_map(const std::filesystem::path& file);

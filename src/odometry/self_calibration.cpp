@@ -100,11 +100,9 @@ void SelfCalibration::observe(const Keyframe& keyframe,
   }
   fuse_result();
   approach_target();
-  const WindowOptions window_options{.num_keyframes = kNumKeyframes};
-  Keyframe freed = keyframe;
-  free_again(radial_lens(camera_, radial), freed.points);
-  add_keyframe(run_, std::move(freed), window_options);
-  triangulate_landmarks(run_, camera_, window_options);
+  run_.keyframes.push_back(keyframe);
+  free_again(radial_lens(camera_, radial), run_.keyframes.back().points);
+  triangulate_landmarks(run_, camera_, {});
   if (static_cast<int>(run_.keyframes.size()) == kNumKeyframes) {
     begin_measuring(options);
   }
@@ -159,18 +157,12 @@ void SelfCalibration::approach_target() {
   const double focal = step(2, kMaxStep_px / given_.mean_focal_px());
   camera_.fx_px += focal * given_.fx_px;
   camera_.fy_px += focal * given_.fy_px;
-  approach_lens(left.tail<2>());
-}
-
-/// The run's pixels follow, so that it is measured as one.
-void SelfCalibration::approach_lens(const Eigen::Vector2d& left) {
-  if (left.isZero()) {
-    return;
-  }
-  const RadialLens before = lens();
-  radial_ += std::min(1.0, kMaxLensStep_px / std::abs(side_px().dot(left))) * left;
-  for (Keyframe& keyframe : run_.keyframes) {
-    free_again(before, keyframe.points);
+  if (const Eigen::Vector2d of_lens = left.tail<2>(); !of_lens.isZero()) {
+    const RadialLens before = lens();
+    radial_ += std::min(1.0, kMaxLensStep_px / std::abs(side_px().dot(of_lens))) * of_lens;
+    for (Keyframe& keyframe : run_.keyframes) {  // so that the run is measured as one
+      free_again(before, keyframe.points);
+    }
   }
 }
 

@@ -78,7 +78,6 @@ class SelfCalibration {
   /// The run that is measured, if there is one; waits for it.
   void fuse_result();
   void approach_target();
-  void approach_lens(const Eigen::Vector2d& left);
   /// Pixels that were freed of another lens are freed of lens().
   void free_again(const RadialLens& before, Observations& points) const;
   /// What a pixel at the image's side is moved by, px, for k1 and k2 of 1.

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "odometry/check_frame.hpp"
 #include "odometry/frame_clock.hpp"
 #include "try.hpp"
 
@@ -28,18 +28,6 @@ Status check_sigma(const char* name, double sigma) {
   return sigma > 0.0 && std::isfinite(sigma)
              ? Status()
              : Status(fail(fmt::format("{}: expected a sigma above 0, found {}", name, sigma)));
-}
-
-constexpr double kNever_s = -std::numeric_limits<double>::infinity();
-
-Status check_time(const char* name, double time_s, double last_s) {
-  if (std::isfinite(time_s) && time_s > last_s) {
-    return {};
-  }
-  const std::string expected = std::isfinite(last_s)
-                                   ? fmt::format("a time after the last one's, {} s", last_s)
-                                   : "a finite time";
-  return fail(fmt::format("{}: expected {}, found {} s", name, expected, time_s));
 }
 
 /// A station is so many pixels of motion from the one before, and its place known to so many.
@@ -63,7 +51,8 @@ double usual_speed_sigma(double metres_per_s) {
 
 Status WayInput::add_speed(double time_s, double metres_per_s, std::optional<double> given_sigma) {
   STEMVO_TRY(check_source(source_));
-  STEMVO_TRY(check_time("speed", time_s, last_speed_ ? last_speed_->time_s : kNever_s));
+  const auto last_s = last_speed_ ? std::optional(last_speed_->time_s) : std::nullopt;
+  STEMVO_TRY(check_time("speed", time_s, last_s, "speed"));
   if (!std::isfinite(metres_per_s)) {
     return fail(fmt::format("speed: expected a number of m/s, found {}", metres_per_s));
   }
@@ -85,8 +74,8 @@ Status WayInput::add_speed(double time_s, double metres_per_s, std::optional<dou
 
 Status WayInput::add_distance(double from_s, double to_s, double metres, double sigma) {
   STEMVO_TRY(check_source(source_));
-  STEMVO_TRY(check_time("distance", from_s, kNever_s));
-  STEMVO_TRY(check_time("distance", to_s, last_to_s_));
+  STEMVO_TRY(check_time("distance", from_s, std::nullopt, "distance"));
+  STEMVO_TRY(check_time("distance", to_s, last_to_s_, "distance"));
   STEMVO_TRY(check_sigma("distance", sigma));
   if (!(from_s < to_s)) {
     return fail(fmt::format("distance: expected a time after its beginning, {} s, found {} s",
@@ -129,8 +118,9 @@ void WayScale::move(const Rigid3& cur_from_prev, double time_s, double pixel_uni
   }
 }
 
-void WayScale::join_ended(Queue& queue) const {
+bool WayScale::measure(Queue& queue, ScaleFilter& filter) const {
   auto& [waiting, joined] = queue;
+  // Those that have ended are one way.
   for (; !waiting.empty() && waiting.front().to_s <= stations_.back().time_s; waiting.pop_front()) {
     const Way& way = waiting.front();
     if (joined && std::abs(way.from_s - joined->to_s) < kSameTime_s) {
@@ -140,18 +130,14 @@ void WayScale::join_ended(Queue& queue) const {
     } else {
       joined = way;
     }
-    if (!covers(*joined)) {
+    if (joined->from_s < stations_.front().time_s) {
       joined.reset();
     }
   }
-}
-
-bool WayScale::measure(Queue& queue, ScaleFilter& filter) const {
-  join_ended(queue);
-  if (!queue.joined) {
+  if (!joined) {
     return false;
   }
-  const Way& way = *queue.joined;
+  const Way& way = *joined;
   const double units = length_at(way.to_s) - length_at(way.from_s);
   if (!(units > 0.0 && units >= kStation_px * pixel_units_ &&
         way.metres > kMinWaySigmas * way.sigma_m)) {
@@ -160,7 +146,7 @@ bool WayScale::measure(Queue& queue, ScaleFilter& filter) const {
   const double sigma =
       std::hypot(way.sigma_m / way.metres, std::sqrt(2.0) * kPlace_px * pixel_units_ / units);
   const bool is_believed = filter.update(std::log(way.metres / units), sigma, ScaleWitness::kWay);
-  queue.joined.reset();
+  joined.reset();
   return is_believed;
 }
 

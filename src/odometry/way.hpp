@@ -3,7 +3,6 @@
 
 #include <array>
 #include <deque>
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -54,7 +53,7 @@ class WayInput {
   };
   ScaleSource source_;
   std::optional<Speed> last_speed_;
-  double last_to_s_ = -std::numeric_limits<double>::infinity();  ///< of a distance
+  std::optional<double> last_to_s_;  ///< of a distance
   std::vector<Way> ways_;
 };
 
@@ -113,10 +112,6 @@ class WayScale {
     const double share = (time_s - before.time_s) / (after->time_s - before.time_s);
     return before.length + share * (after->length - before.length);
   }
-  [[nodiscard]] bool covers(const Way& way) const {
-    return way.from_s >= stations_.front().time_s && way.to_s <= stations_.back().time_s;
-  }
-  void join_ended(Queue& queue) const;
   [[nodiscard]] bool measure(Queue& queue, ScaleFilter& filter) const;
   /// By ways, or parts of ways, that are inside the path.
   void guess(ScaleFilter& filter) const;

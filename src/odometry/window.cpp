@@ -206,26 +206,20 @@ std::size_t leaving_keyframe(const Window& window, const Keyframe& coming) {
 }
 
 std::vector<int> lost_tracks(const Window& window, std::size_t leaving, const Keyframe& coming) {
-  const Keyframe& keyframe = window.keyframes[leaving];
   std::vector<int> lost;
-  for (const Observation& point : keyframe.points) {
-    const auto sees = [&](const Keyframe& other) {
-      return &other != &keyframe && find_point(other.points, point.track_id) != nullptr;
-    };
-    if (!sees(coming) && std::none_of(window.keyframes.begin(), window.keyframes.end(), sees)) {
+  ObservationWalk walk(window);
+  for (const Observation& point : window.keyframes[leaving].points) {
+    if (walk.seek(point.track_id).size() == 1 &&
+        find_point(coming.points, point.track_id) == nullptr) {
       lost.push_back(point.track_id);
     }
   }
   return lost;
 }
 
-void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options) {
-  if (static_cast<int>(window.keyframes.size()) >= options.num_keyframes) {
-    const std::size_t leaving = leaving_keyframe(window, keyframe);
-    drop_landmarks(window, lost_tracks(window, leaving, keyframe));
-    window.keyframes.erase(window.keyframes.begin() + static_cast<std::ptrdiff_t>(leaving));
-  }
-  window.keyframes.push_back(std::move(keyframe));
+void drop_keyframe(Window& window, std::size_t leaving, const Keyframe& coming) {
+  drop_landmarks(window, lost_tracks(window, leaving, coming));
+  window.keyframes.erase(window.keyframes.begin() + static_cast<std::ptrdiff_t>(leaving));
 }
 
 void triangulate_landmarks(Window& window, const Camera& camera, const WindowOptions& options) {

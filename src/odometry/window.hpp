@@ -107,9 +107,8 @@ class ObservationWalk {
                                            std::size_t leaving,
                                            const Keyframe& coming);
 
-/// Appends the keyframe to the window. A full one first drops its leaving keyframe, and landmarks
-/// that no keyframe sees any more.
-void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options);
+/// Drops a keyframe for the one that comes, and landmarks that no keyframe sees any more.
+void drop_keyframe(Window& window, std::size_t leaving, const Keyframe& coming);
 
 /// Triangulates the tracks of the newest keyframe that are no landmarks yet, from the first and the
 /// last keyframe that see them. Kept are points with enough parallax, in front of every keyframe

@@ -29,8 +29,6 @@ constexpr double kTracksNoise_px = 0.05;
 constexpr double kHides = 2.0;
 /// So many times the flow of a stationary frame is what errors of landmarks do to one that turns.
 constexpr double kTurnFlow = 3.0;
-/// Who stood is believed to stand for so long where things that pass hide the world.
-constexpr double kHidden_s = 3.0;
 /// A track this near moves as the world does, where a thing is the other choice.
 constexpr double kAgrees_px = 1.0;
 
@@ -65,8 +63,7 @@ LocalizedFrame WindowEstimator::localize(const Frame& frame) {
   LocalizedFrame localized;
   FrameResult& result = localized.result;
   std::vector<char>& mask = localized.inlier_mask;
-  mask.assign(frame.matches.cur_uv.size(), 1);
-  moving_.leave_out(frame.matches, mask);
+  mask = without(moving_.flags(frame.matches), std::vector<char>(frame.matches.cur_uv.size(), 1));
   result.state = find_pose(frame, localized);
   was_static_ = frame.has_image() ? result.state != FrameState::kTracking : was_static_;
   result.num_matches = static_cast<int>(mask.size());
@@ -141,7 +138,7 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
     mark_outliers(frame.matches, kAgrees_px, fits_world);
     moving_.observe(frame.matches, fits_world);
     localized.moving_mask = moving_.flags(frame.matches);
-    moving_.leave_out(frame.matches, localized.inlier_mask);
+    localized.inlier_mask = without(localized.moving_mask, localized.inlier_mask);
   }
   Observations now = current_points(frame.matches, localized.inlier_mask);
   const SeenLandmarks seen = find_seen_landmarks(window_, now);
@@ -221,15 +218,12 @@ FrameState WindowEstimator::measure_since_reference(const Frame& frame,
   const Keyframe* stood = had_map ? standing_keyframe(frame, now) : nullptr;
   if (stood != nullptr) {
     reset_reference({stood->frame, stood->world_from_camera, stood->points,
-                     times_s_[static_cast<std::size_t>(stood->frame)], nullptr});
+                     times_s_[slot(stood->frame)], nullptr});
   } else if (had_map || starts_elsewhere || initializer_.lost_reference(now)) {
     // Where the matches start: the frame before, or the last one before trouble.
     const int first = std::max(frame.matches.prev_frame, 0);
-    reset_reference({first,
-                     trajectory_[static_cast<std::size_t>(first)],
-                     {},
-                     times_s_[static_cast<std::size_t>(first)],
-                     first == last_.frame ? last_.road : nullptr});
+    const auto road = first == last_.frame ? last_.road : nullptr;
+    reset_reference({first, trajectory_[slot(first)], {}, times_s_[slot(first)], road});
   }
   MeasuredMotion motion = initializer_.measure(frame.matches, now, camera());
   const double num_matches = static_cast<double>(frame.matches.cur_uv.size());
@@ -253,21 +247,27 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
     std::fill(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{0});
     return FrameState::kLost;
   }
-  // The length of the way since the reference is not known: the speed's in the time it moved.
   const View& reference = initializer_.reference();
   const Rigid3 direction = motion.cur_from_prev.inverse();
-  const double length = speed_ * (frame.time_s - reference.time_s - still_s_);
+  const bool is_tracking = motion.state == FrameState::kTracking;
+  const bool is_decisive = is_tracking && motion.is_decisive;
+  Observations now = current_points(frame.matches, motion.inlier_mask);
+  const std::optional<double> told =
+      is_decisive ? length_since_stand(now, motion.cur_from_prev) : std::nullopt;
+  // Where nothing tells the length of the way, it is the speed's in the time it moved.
+  const double length = told.value_or(speed_ * (frame.time_s - reference.time_s - still_s_));
   const Rigid3 guess =
       reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
-  const bool is_tracking = motion.state == FrameState::kTracking;
-  if (is_tracking && motion.is_decisive && go_on_from_stand(frame, motion)) {
-    return FrameState::kTracking;
-  }
-  if (is_tracking && motion.is_decisive && !mapper_.may_be_locating() &&
-      open_window({frame.number, guess, current_points(frame.matches, motion.inlier_mask),
-                   frame.time_s, frame.road})) {
+  View view{frame.number, guess, std::move(now), frame.time_s, frame.road};
+  if (told || (is_decisive && !mapper_.may_be_locating() && open_window(view))) {
+    world_from_camera_ = guess;
+    moved_to_ = guess.translation;
+    moving_view_ = view;
+    view_ = std::move(view);
     moving_.add(frame.matches, motion.moving_mask);
-    return FrameState::kInitializing;
+    stood_ = false;
+    is_initializing_ = false;
+    return told ? FrameState::kTracking : FrameState::kInitializing;
   }
   // Until there is a first map, the position is held; later the camera goes on as fast as it was.
   const bool goes_on = !window_.keyframes.empty() && is_tracking;
@@ -288,7 +288,7 @@ void WindowEstimator::reset_reference(View reference) {
   is_initializing_ = true;
 }
 
-bool WindowEstimator::open_window(View view) {
+bool WindowEstimator::open_window(const View& view) {
   const View& reference = initializer_.reference();
   std::optional<Window> window = initializer_.open_window(view, camera(), window_options_);
   if (!window.has_value()) {
@@ -303,13 +303,7 @@ bool WindowEstimator::open_window(View view) {
   scale_.restart(road_view.road.get(), road_view.time_s);
   calibration_.restart();
   road_pose_ = road_view.world_from_camera;
-  is_initializing_ = false;
-  world_from_camera_ = view.world_from_camera;
-  moved_to_ = view.world_from_camera.translation;
-  moving_view_ = view;
-  stood_ = false;
   stand_ = {};
-  view_ = std::move(view);
   return true;
 }
 
@@ -361,11 +355,15 @@ bool WindowEstimator::is_keyframe(const View& view) const {
 
 void WindowEstimator::append(Keyframe keyframe) {
   if (window_.keyframes.size() >= static_cast<std::size_t>(window_options_.num_keyframes)) {
-    const std::size_t leaving = leaving_keyframe(window_, keyframe);
-    mapper_.leave(window_view(), leaving);
-    history_.leave(window_, leaving, keyframe);
+    leave(leaving_keyframe(window_, keyframe), keyframe);
   }
-  stemvo::add_keyframe(window_, std::move(keyframe), window_options_);
+  window_.keyframes.push_back(std::move(keyframe));
+}
+
+void WindowEstimator::leave(std::size_t leaving, const Keyframe& coming) {
+  mapper_.leave(window_view(), leaving);
+  history_.leave(window_, leaving, coming);
+  drop_keyframe(window_, leaving, coming);
 }
 
 void WindowEstimator::add_keyframe(const Frame& frame) {

@@ -136,10 +136,12 @@ class WindowEstimator final : public Estimator {
                            LocalizedFrame& localized);
 
   // A camera that stood moves off.
+  static constexpr double kHidden_s = 3.0;  ///< it is believed to stand where things hide the world
   void keep_stand();
   [[nodiscard]] const Keyframe* standing_keyframe(const Frame& frame,
                                                   const Observations& now) const;
-  [[nodiscard]] bool go_on_from_stand(const Frame& frame, const MeasuredMotion& motion);
+  [[nodiscard]] std::optional<double> length_since_stand(const Observations& now,
+                                                         const Rigid3& cur_from_stand) const;
 
   /// The pose if the last motion goes on. `turned`: its rotation, where that is known.
   [[nodiscard]] Rigid3 predict(const std::optional<Eigen::Quaterniond>& turned = {}) const {
@@ -150,7 +152,7 @@ class WindowEstimator final : public Estimator {
     return frame.has_image() && view_.frame == frame.number;
   }
   void reset_reference(View reference);
-  [[nodiscard]] bool open_window(View view);
+  [[nodiscard]] bool open_window(const View& view);
   [[nodiscard]] WindowView window_view() const {
     return {window_,     history_, camera(),      radials_,
             trajectory_, times_s_, metric_sigma_, view_.frame};
@@ -170,8 +172,10 @@ class WindowEstimator final : public Estimator {
   // After localization.
   [[nodiscard]] bool is_keyframe(const View& view) const;
   void add_keyframe(const Frame& frame);
-  /// A full window first drops its leaving keyframe, which the map keeps.
+  /// A full window first drops its leaving keyframe.
   void append(Keyframe keyframe);
+  /// A keyframe of the window, which the map keeps, is dropped for the one that comes.
+  void leave(std::size_t leaving, const Keyframe& coming);
   /// An old place was recognized: the window keeps to it.
   void take_in(const Recognition& recognition);
   /// Units of motion that move the median landmark in view by a pixel.

@@ -28,31 +28,24 @@ std::array<std::uint8_t, 3> color_at(const cv::Mat& image, const Eigen::Vector2d
 
 void WindowHistory::observe(const Window& window, const cv::Mat& image) {
   const Keyframe& newest = window.keyframes.back();
+  ObservationWalk walk(window);
   for (const Observation& observation : newest.points) {
-    const auto sees = [&](const Keyframe& keyframe) {
-      return find_point(keyframe.points, observation.track_id) != nullptr;
-    };
+    const std::span<const KeyframeObservation> views = walk.seek(observation.track_id);
     const auto [found, is_new] = tracks_.try_emplace(observation.track_id);
     Track& track = found->second;
     track.id = is_new ? num_landmarks_++ : track.id;
     // A new corner came to its first keyframe with the frame behind it.
-    track.num_keyframes +=
-        is_new ? static_cast<int>(std::ranges::count_if(window.keyframes, sees)) : 1;
+    track.num_keyframes += is_new ? static_cast<int>(views.size()) : 1;
     track.rgb = color_at(image, observation.uv);  // the last view is the nearest
     const auto landmark = window.landmarks.find(observation.track_id);
-    if (landmark == window.landmarks.end()) {
-      continue;
+    if (landmark != window.landmarks.end()) {
+      const Keyframe& oldest = window.keyframes[views.front().keyframe];
+      track.max_parallax_rad = std::max(
+          track.max_parallax_rad,
+          parallax_rad(landmark->second, oldest.world_from_camera, newest.world_from_camera));
     }
-    const auto oldest = std::ranges::find_if(window.keyframes, sees);
-    track.max_parallax_rad = std::max(
-        track.max_parallax_rad,
-        parallax_rad(landmark->second, oldest->world_from_camera, newest.world_from_camera));
   }
-  show(window);
-}
-
-/// Looks which landmarks of the window are well constrained.
-void WindowHistory::show(const Window& window) {
+  // Which landmarks of the window are well constrained.
   window_moved_at_ = now();
   for (auto& [track_id, track] : tracks_) {
     const bool is_shown = track.num_keyframes >= kMinKeyframes &&

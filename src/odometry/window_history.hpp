@@ -102,7 +102,6 @@ class WindowHistory {
     }
     tracks_.erase(track);
   }
-  void show(const Window& window);
 
   std::vector<Change<KeptLandmark>> left_;  ///< only added to
   std::vector<Change<int>> removed_;        ///< ids; only added to

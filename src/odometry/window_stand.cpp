@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -16,27 +15,25 @@ namespace stemvo {
 
 namespace {
 
-/// So long after a stand its keyframe is what a frame without a pose is measured against, where so
-/// many landmarks and tracks of it are left.
-constexpr double kSinceStand_s = 3.0;
+/// The stand's keyframe is what a frame without a pose is measured against, where so many landmarks
+/// and tracks of it are left.
 constexpr int kMinLandmarks = 4;
 constexpr std::size_t kMinTracks = 50;
 /// Landmarks tell a length by so many pixels of parallax (root of their squares' sum): with errors
 /// of 0.3 px, to 3 %.
 constexpr double kTelling_px = 10.0;
 
-/// Where landmarks are on the way between two frames: the length of the way that puts each nearest
-/// to where it is seen, and the pixels that a unit of it moves the landmark.
-struct Lengths {
-  std::vector<double> length;
-  std::vector<double> px_per_unit;
+/// What a landmark tells of the way between two frames.
+struct ToldLength {
+  double length;       ///< puts the landmark nearest to where it is seen
+  double px_per_unit;  ///< moves the landmark
 };
 
-Lengths measure_lengths(const SeenLandmarks& seen,
-                        const Rigid3& reference_from_world,
-                        const Rigid3& cur_from_reference,
-                        const Camera& camera) {
-  Lengths lengths;
+std::vector<ToldLength> measure_lengths(const SeenLandmarks& seen,
+                                        const Rigid3& reference_from_world,
+                                        const Rigid3& cur_from_reference,
+                                        const Camera& camera) {
+  std::vector<ToldLength> lengths;
   for (std::size_t i = 0; i < seen.points.size(); ++i) {
     const Eigen::Vector3d turned =
         cur_from_reference.rotation * (reference_from_world * seen.points[i]);
@@ -45,30 +42,31 @@ Lengths measure_lengths(const SeenLandmarks& seen,
     const Eigen::Vector3d along = ray.cross(cur_from_reference.translation);
     const double px = camera.mean_focal_px() * along.norm() / turned.z();
     if (turned.z() > 0.0 && px > 0.0) {
-      lengths.length.push_back(-ray.cross(turned).dot(along) / along.squaredNorm());
-      lengths.px_per_unit.push_back(px);
+      lengths.push_back({-ray.cross(turned).dot(along) / along.squaredNorm(), px});
     }
   }
   return lengths;
 }
 
 /// The median, weighted by the pixels. nullopt: too few landmarks, or too little parallax.
-std::optional<double> most_likely(const Lengths& lengths) {
-  const std::vector<double>& px = lengths.px_per_unit;
-  if (std::ssize(px) < kMinLandmarks) {
+std::optional<double> most_likely(std::vector<ToldLength> lengths) {
+  if (std::ssize(lengths) < kMinLandmarks) {
     return std::nullopt;
   }
-  std::vector<std::size_t> order(px.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::sort(order, {}, [&](std::size_t i) { return lengths.length[i]; });
-  double left = 0.5 * std::accumulate(px.begin(), px.end(), 0.0);
-  const auto middle = std::ranges::find_if(order, [&](std::size_t i) {
-    left -= px[i];
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const ToldLength& told : lengths) {
+    sum += told.px_per_unit;
+    squares += told.px_per_unit * told.px_per_unit;
+  }
+  std::ranges::sort(lengths, {}, &ToldLength::length);
+  double left = 0.5 * sum;
+  const auto middle = std::ranges::find_if(lengths, [&](const ToldLength& told) {
+    left -= told.px_per_unit;
     return left <= 0.0;
   });
-  const double length = lengths.length[*middle];
-  const double squares = std::inner_product(px.begin(), px.end(), px.begin(), 0.0);
-  return length * std::sqrt(squares) > kTelling_px ? std::optional(length) : std::nullopt;
+  return middle->length * std::sqrt(squares) > kTelling_px ? std::optional(middle->length)
+                                                           : std::nullopt;
 }
 
 }  // namespace
@@ -84,11 +82,7 @@ void WindowEstimator::keep_stand() {
   Keyframe keyframe{stand_.frame, trajectory_[static_cast<std::size_t>(stand_.frame)],
                     std::move(points)};
   if (std::exchange(stand_.keyframe, stand_.frame) == newest) {
-    const std::size_t last = window_.keyframes.size() - 1;
-    mapper_.leave(window_view(), last);
-    history_.leave(window_, last, keyframe);
-    drop_landmarks(window_, lost_tracks(window_, last, keyframe));
-    window_.keyframes.pop_back();
+    leave(window_.keyframes.size() - 1, keyframe);
   }
   append(std::move(keyframe));
   history_.add_keyframe(stand_.frame);
@@ -98,37 +92,22 @@ void WindowEstimator::keep_stand() {
 const Keyframe* WindowEstimator::standing_keyframe(const Frame& frame,
                                                    const Observations& now) const {
   const auto stood = std::ranges::find(window_.keyframes, stand_.frame, &Keyframe::frame);
-  const bool is_one =
-      stood != window_.keyframes.end() &&
-      frame.time_s - times_s_[static_cast<std::size_t>(stood->frame)] < kSinceStand_s &&
-      find_seen_landmarks(window_, now).size() >= kMinLandmarks &&
-      common_points(stood->points, now).cur_uv.size() >= kMinTracks;
+  const bool is_one = stood != window_.keyframes.end() &&
+                      frame.time_s - times_s_[static_cast<std::size_t>(stood->frame)] < kHidden_s &&
+                      find_seen_landmarks(window_, now).size() >= kMinLandmarks &&
+                      common_points(stood->points, now).cur_uv.size() >= kMinTracks;
   return is_one ? &*stood : nullptr;
 }
 
-/// False: the motion's reference is no stand, or nothing tells how long the way is.
-bool WindowEstimator::go_on_from_stand(const Frame& frame, const MeasuredMotion& motion) {
+/// Nullopt: the reference is no stand, or nothing tells how long the way is.
+std::optional<double> WindowEstimator::length_since_stand(const Observations& now,
+                                                          const Rigid3& cur_from_stand) const {
   const View& stand = initializer_.reference();
-  if (stand.frame != stand_.frame) {
-    return false;
-  }
-  Observations now = current_points(frame.matches, motion.inlier_mask);
-  const std::optional<double> length = most_likely(
-      measure_lengths(find_seen_landmarks(window_, now), stand.world_from_camera.inverse(),
-                      motion.cur_from_prev, camera()));
-  if (!length.has_value()) {
-    return false;
-  }
-  const Rigid3 direction = motion.cur_from_prev.inverse();
-  world_from_camera_ =
-      stand.world_from_camera * Rigid3(direction.rotation, *length * direction.translation);
-  moved_to_ = world_from_camera_.translation;
-  view_ = {frame.number, world_from_camera_, std::move(now), frame.time_s};
-  moving_view_ = view_;
-  moving_.add(frame.matches, motion.moving_mask);
-  stood_ = false;
-  is_initializing_ = false;
-  return true;
+  return stand.frame != stand_.frame
+             ? std::nullopt
+             : most_likely(measure_lengths(find_seen_landmarks(window_, now),
+                                           stand.world_from_camera.inverse(), cur_from_stand,
+                                           camera()));
 }
 
 }  // namespace stemvo

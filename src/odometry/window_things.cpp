@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "geometry/median.hpp"
@@ -45,24 +46,16 @@ constexpr double kOffTimes = 3.0;
 constexpr double kMaxShift = 0.03;
 constexpr double kWorse = 2.5;
 
-std::vector<char> without(const std::vector<char>& some, const std::vector<char>& mask) {
-  std::vector<char> rest(mask.size());
-  std::ranges::transform(mask, some, rest.begin(), [](char is_kept, char is_one) {
-    return static_cast<char>(is_kept != 0 && is_one == 0);
-  });
-  return rest;
-}
-
 /// One flag per landmark: its parallax since the first keyframe that sees it.
 std::vector<char> are_near(const Window& window, const SeenLandmarks& seen, const Rigid3& pose) {
   std::vector<char> flags(seen.points.size());
+  ObservationWalk walk(window);
   for (std::size_t i = 0; i < flags.size(); ++i) {
-    const auto first = std::ranges::find_if(window.keyframes, [&](const Keyframe& keyframe) {
-      return find_point(keyframe.points, seen.track_ids[i]) != nullptr;
-    });
-    flags[i] =
-        static_cast<char>(first != window.keyframes.end() &&
-                          parallax_rad(seen.points[i], first->world_from_camera, pose) > kNear_rad);
+    const std::span<const KeyframeObservation> views = walk.seek(seen.track_ids[i]);
+    flags[i] = static_cast<char>(
+        !views.empty() &&
+        parallax_rad(seen.points[i], window.keyframes[views.front().keyframe].world_from_camera,
+                     pose) > kNear_rad);
   }
   return flags;
 }
@@ -124,9 +117,10 @@ std::optional<Localization> WindowEstimator::localize_by_near(const SeenLandmark
   const auto near_px = [&](const std::vector<double>& errors_px) {
     return median(select(errors_px, is_near));
   };
-  const std::vector<double> errors_px = distances_px(seen, world->world_from_camera, camera());
+  const std::vector<double> errors_px =
+      distances_px(seen, world->world_from_camera.inverse(), camera());
   if (way(found) > kMaxShift * way(last_.world_from_camera) &&
-      near_px(distances_px(seen, found, camera())) < kWorse * near_px(errors_px)) {
+      near_px(distances_px(seen, found.inverse(), camera())) < kWorse * near_px(errors_px)) {
     return std::nullopt;
   }
   const std::vector<char> is_far = without(is_near, std::vector<char>(is_near.size(), 1));

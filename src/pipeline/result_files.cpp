@@ -167,7 +167,7 @@ class ResultWriter {
     }
     keep_first(written, write_poses("trajectory_map", map_->trajectory));
     if (request_.saved_map) {
-      keep_first(written, run_.odometry.save_map(*request_.saved_map, map_->whole));
+      keep_first(written, run_.odometry.save_map(*request_.saved_map, map_->whole.kept));
     }
     report.map = {.num_keyframes = map_->whole.kept.keyframes.size(),
                   .num_loops = frames_of_loops(map_->whole.kept).size(),

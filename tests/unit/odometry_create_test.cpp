@@ -148,8 +148,9 @@ TEST(OdometryProcess, AnImageOfAnotherSizeOrTypeIsAnErrorAndChangesNothing) {
   EXPECT_THAT(message(cv::Mat3b(95, 320), PixelOrder::kRgb),
               AllOf(HasSubstr("expected 320x96"), HasSubstr("found 320x95")));
   EXPECT_THAT(message(cv::Mat(), PixelOrder::kGray), HasSubstr("found 0x0"));
-  EXPECT_THAT(message(cv::Mat1b(96, 320), PixelOrder::kBgr), HasSubstr("expected 3 channels"));
-  EXPECT_THAT(message(cv::Mat3b(96, 320), PixelOrder::kGray), HasSubstr("expected 1 channel of"));
+  EXPECT_THAT(message(cv::Mat1b(96, 320), PixelOrder::kBgr), HasSubstr("pixels of CV_8UC3, found"));
+  EXPECT_THAT(message(cv::Mat3b(96, 320), PixelOrder::kGray),
+              HasSubstr("pixels of CV_8UC1, found"));
   EXPECT_THAT(message(cv::Mat1w(96, 320), PixelOrder::kGray), HasSubstr("CV_16U"));
   EXPECT_EQ(odometry.process(image_at(0), PixelOrder::kRgb, 1.0)->state, FrameState::kFirst);
 }

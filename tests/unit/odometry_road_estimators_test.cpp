@@ -76,7 +76,6 @@ TEST_P(RoadEstimator, SaysWhyThereIsNoMeasurement) {
   blank.noise_gray = 20.0;  // two images that have nothing to do with each other
   const RoadPair noise = render_pair(blank, 0.8);
   EXPECT_FALSE(measured(noise, noise.cur_from_prev).is_valid);
-  EXPECT_EQ(measured(render_pair(RoadScene{}, 0.8), Rigid3{}).reason, "no motion");
 }
 
 INSTANTIATE_TEST_SUITE_P(Both,

@@ -153,12 +153,12 @@ TEST(WayInput, RefusesWhatIsNoMeasurementAndSaysWhy) {
   const auto speed = [&](double time_s, double metres_per_s, double sigma) {
     return message_of(ways.add_speed(time_s, metres_per_s, sigma));
   };
-  EXPECT_THAT(speed(kNan, 1.0, 0.1), HasSubstr("speed: expected a finite time, found nan"));
+  EXPECT_THAT(speed(kNan, 1.0, 0.1), HasSubstr("speed: expected a finite number of seconds"));
   EXPECT_THAT(speed(0.0, kNan, 0.1), HasSubstr("expected a number of m/s, found nan"));
   EXPECT_THAT(speed(0.0, 1.0, 0.0), HasSubstr("expected a sigma above 0, found 0"));
   EXPECT_THAT(speed(0.0, 1.0, kNan), HasSubstr("expected a sigma above 0, found nan"));
   EXPECT_EQ(speed(1.0, -1.0, 0.1), "no error");
-  EXPECT_THAT(speed(1.0, 1.0, 0.1), HasSubstr("after the last one's, 1 s, found 1 s"));
+  EXPECT_THAT(speed(1.0, 1.0, 0.1), HasSubstr("after the last speed's, 1 s, found 1 s"));
   EXPECT_EQ(speed(1.5, 1.0, 0.1), "no error");
   ASSERT_EQ(ways.take(1.5).size(), 1U);
   EXPECT_EQ(speed(9.0, 1.0, 0.1), "no error");  // too far from the one before
@@ -170,7 +170,7 @@ TEST(WayInput, RefusesWhatIsNoMeasurementAndSaysWhy) {
   EXPECT_THAT(distance(1.0, 2.0, -1.0, 0.1), HasSubstr("expected at least 0 m, found -1"));
   EXPECT_THAT(distance(1.0, 2.0, 1.0, -0.1), HasSubstr("expected a sigma above 0, found -0.1"));
   EXPECT_EQ(distance(1.0, 2.0, 1.0, 0.1), "no error");
-  EXPECT_THAT(distance(0.0, 2.0, 1.0, 0.1), HasSubstr("after the last one's, 2 s, found 2 s"));
+  EXPECT_THAT(distance(0.0, 2.0, 1.0, 0.1), HasSubstr("after the last distance's, 2 s, found 2 s"));
   WayInput constant(ScaleSource::kConstantSpeed);
   EXPECT_THAT(message_of(constant.add_speed(0.0, 1.0, 0.1)),
               HasSubstr("scale.source: expected none or camera_height"));

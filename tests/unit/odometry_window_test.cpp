@@ -9,6 +9,13 @@
 namespace stemvo {
 namespace {
 
+void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options) {
+  if (std::ssize(window.keyframes) >= options.num_keyframes) {
+    drop_keyframe(window, leaving_keyframe(window, keyframe), keyframe);
+  }
+  window.keyframes.push_back(std::move(keyframe));
+}
+
 Window window_of(const DriveTracks& drive, const WindowOptions& options) {
   Window window;
   for (std::size_t i = 0; i < drive.world_from_camera.size(); ++i) {

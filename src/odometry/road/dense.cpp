@@ -284,9 +284,6 @@ RoadMeasurement refine(const RoadStep& step, const std::vector<Grid>& grids, Roa
 }  // namespace
 
 RoadMeasurement measure_dense(const RoadStep& step) {
-  if (!(step.cur_from_prev.translation.norm() > 0.0)) {
-    return no_road("no motion");
-  }
   if (step.prev.full.values.empty() || step.cur.full.values.empty()) {
     return no_road("the image ends above the road", false);
   }

@@ -18,7 +18,7 @@ struct RoadOptions {
   double far_m = 22.0;               ///< its far end; the near end is the image's
   double rotation_sigma_rad = 2e-4;  ///< of the given motion's rotation, per axis
 
-  // The road's profile, from the path that was driven (RoadPath).
+  // The road's profile, from the path that was driven (RoadScale).
   double heave_sigma_m = 0.03;         ///< of the camera's height above the road
   double bend_sigma_per_m = 1e-3;      ///< of half the road's vertical curvature
   double path_m = 15.0;                ///< as far back as the path is used

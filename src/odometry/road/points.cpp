@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -47,23 +48,20 @@ struct Strip {
 };
 
 Strip find_strip(const RoadImage& cur, const RoadRegion& region, const RoadOptions& options) {
-  Strip strip;
-  const std::vector<RoadRegion::Sample> samples =
-      region.samples(cur.full.camera, cur.full.first_row, 4, 4);
-  cv::Mat mask = cv::Mat::zeros(cur.pixels.size(), CV_8U);
-  cv::Point low(cur.pixels.cols, cur.pixels.rows);
-  cv::Point high(0, 0);
-  for (const RoadRegion::Sample& sample : samples) {
-    mask(cv::Rect(sample.u, sample.v, 4, 4) & cv::Rect({}, mask.size())).setTo(255);
-    low = {std::min(low.x, sample.u), std::min(low.y, sample.v)};
-    high = {std::max(high.x, sample.u), std::max(high.y, sample.v)};
+  constexpr int kStep = 4;
+  const cv::Rect image({}, cur.pixels.size());
+  cv::Mat mask = cv::Mat::zeros(image.size(), CV_8U);
+  for (const RoadRegion::Sample& sample :
+       region.samples(cur.full.camera, cur.full.first_row, kStep, kStep)) {
+    mask(cv::Rect(sample.u, sample.v, kStep, kStep) & image).setTo(255);
   }
-  strip.box = cv::Rect(low - cv::Point(kTrackingBorder_px, kTrackingBorder_px),
-                       high + cv::Point(kTrackingBorder_px, kTrackingBorder_px)) &
-              cv::Rect({}, cur.pixels.size());
-  if (samples.empty() || strip.box.area() == 0) {
+  const cv::Rect seen = cv::boundingRect(mask);
+  if (seen.empty()) {
     return {};
   }
+  const cv::Point border(kTrackingBorder_px, kTrackingBorder_px);
+  Strip strip;
+  strip.box = cv::Rect(seen.tl() - border, seen.br() + border - cv::Point(kStep, kStep)) & image;
   cv::goodFeaturesToTrack(cur.pixels(strip.box), strip.corners, options.max_points,
                           options.corner_quality, options.corner_distance_px / cur.map.scale.x(),
                           mask(strip.box));
@@ -168,12 +166,13 @@ std::vector<Track> track_corners(const RoadStep& step, const Strip& strip, const
 struct Fit {
   RoadMatrix covariance = RoadMatrix::Zero();
   int num_inliers = 0;
-  bool is_valid = false;
 };
 
 /// Reweighted Gauss-Newton from the predicted plane: Tukey's weights, their width from the median
 /// residual (it shrinks as the fit improves).
-Fit fit_road(const std::vector<Track>& tracks, const RoadStep& step, RoadWarp& warp) {
+std::optional<Fit> fit_road(const std::vector<Track>& tracks,
+                            const RoadStep& step,
+                            RoadWarp& warp) {
   Fit fit;
   std::vector<Residual> residuals(tracks.size());
   std::vector<double> sizes(tracks.size());
@@ -208,20 +207,16 @@ Fit fit_road(const std::vector<Track>& tracks, const RoadStep& step, RoadWarp& w
     normal.inflate_variance(spread);
     normal.add_prior(warp, step.prior, step.options.rotation_sigma_rad);
     if (!normal.step(warp)) {
-      return fit;
+      return std::nullopt;
     }
     fit.covariance = normal.covariance;
   }
-  fit.is_valid = true;
   return fit;
 }
 
 }  // namespace
 
 RoadMeasurement measure_points(const RoadStep& step) {
-  if (!(step.cur_from_prev.translation.norm() > 0.0)) {
-    return no_road("no motion");
-  }
   if (step.cur.full.values.empty() || step.prev.pixels.size() != step.cur.pixels.size()) {
     return no_road("the image ends above the road", false);
   }
@@ -237,15 +232,15 @@ RoadMeasurement measure_points(const RoadStep& step) {
           kMinTrackedShare * static_cast<double>(strip.corners.size())) {
     return no_road("no tracks on the road");
   }
-  const Fit fit = fit_road(tracks, step, warp);
-  if (!fit.is_valid) {
+  const std::optional<Fit> fit = fit_road(tracks, step, warp);
+  if (!fit.has_value()) {
     return no_road("no plane through the points");
   }
-  RoadMeasurement result = read_road(warp, fit.covariance, step.options.camera_height_m);
+  RoadMeasurement result = read_road(warp, fit->covariance, step.options.camera_height_m);
   const double inlier_share =
-      static_cast<double>(fit.num_inliers) / static_cast<double>(tracks.size());
+      static_cast<double>(fit->num_inliers) / static_cast<double>(tracks.size());
   result.is_valid =
-      fit.num_inliers >= kMinPoints && inlier_share >= kMinInlierShare && result.sigma < kMaxSigma;
+      fit->num_inliers >= kMinPoints && inlier_share >= kMinInlierShare && result.sigma < kMaxSigma;
   result.reason = result.is_valid ? "" : "the points are on no common plane";
   return result;
 }

@@ -50,27 +50,14 @@ Joined join(const RoadMeasurement& dense, const RoadMeasurement& points, double 
 
 }  // namespace
 
-void RoadPath::move(const Rigid3& cur_from_prev) {
-  if (!(cur_from_prev.translation.norm() > 0.0)) {
-    return;  // standing
-  }
-  for (Eigen::Vector3d& position : positions_) {
-    position = cur_from_prev * position;
-  }
-  positions_.push_front(cur_from_prev.translation);
-  if (positions_.size() > kMaxPositions) {
-    positions_.pop_back();
-  }
-}
-
-void RoadPath::predict(double metres_per_unit, RoadPrior& prior) const {
+void RoadScale::predict_profile(double metres_per_unit, RoadPrior& prior) const {
   const double weight = 1.0 / (options_.heave_sigma_m * options_.heave_sigma_m);
   Eigen::Matrix3d information =
       Eigen::Vector3d(weight, 1.0 / (options_.free_slope_sigma_rad * options_.free_slope_sigma_rad),
                       1.0 / (options_.bend_sigma_per_m * options_.bend_sigma_per_m))
           .asDiagonal();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& position : positions_) {
+  for (const Eigen::Vector3d& position : path_) {
     const double z = position.z() * metres_per_unit;
     if (!(z > -options_.path_m && z < 0.0)) {
       break;  // farther back, or turned round: the road may have bent otherwise
@@ -120,7 +107,7 @@ RoadPrior RoadScale::make_prior(const Rigid3& motion, const ScaleFilter& filter)
   } else if (frames_unmeasured_ >= kFramesUntilSearch) {
     prior.log_scale_sigma = std::max(prior.log_scale_sigma, kSearchSigma);
   }
-  path_.predict(std::exp(prior.log_scale), prior);
+  predict_profile(std::exp(prior.log_scale), prior);
   return prior;
 }
 
@@ -204,8 +191,12 @@ RoadScaleEstimate RoadScale::update(RoadImage image,
                                     const Rigid3& cur_from_prev,
                                     ScaleFilter& filter,
                                     const std::vector<RoadLandmark>& landmarks) {
-  if (!past_.empty()) {
-    path_.move(cur_from_prev);
+  if (!past_.empty() && cur_from_prev.translation.norm() > 0.0) {
+    for (Eigen::Vector3d& position : path_) {
+      position = cur_from_prev * position;
+    }
+    path_.push_front(cur_from_prev.translation);
+    path_.resize(std::min(path_.size(), kMaxPositions));
   }
   for (Past& past : past_) {
     past.now_from_past = cur_from_prev * past.now_from_past;

@@ -18,33 +18,6 @@
 
 namespace stemvo {
 
-/// The way that the camera came: it lies above the road at the camera's height, but for the car's
-/// bouncing, and tells the slope and the bend of the road under the car, whatever the camera's
-/// pitch. Without it a crest ahead looks like a larger step (the plane through the road ahead
-/// passes closer under the camera than the road does): 1 mrad of bend between car and strip is 0.3
-/// % of scale.
-class RoadPath {
- public:
-  explicit RoadPath(const RoadOptions& options) : options_(options) {}
-
-  /// `cur_from_prev`: in units of the map.
-  void move(const Rigid3& cur_from_prev);
-  void rescale(double factor) {
-    for (Eigen::Vector3d& position : positions_) {
-      position *= factor;
-    }
-  }
-  void restart() { positions_.clear(); }
-
-  /// Fills slope, drop and their information: y = y0 + slope z + drop / height z^2 through the
-  /// positions, y0: the current vertical bounce.
-  void predict(double metres_per_unit, RoadPrior& prior) const;
-
- private:
-  RoadOptions options_;
-  std::deque<Eigen::Vector3d> positions_;  ///< in the current camera, map units; newest first
-};
-
 /// The road's part in the scale after a frame; nothing of it looks ahead.
 struct RoadScaleEstimate {
   bool is_believed = false;      ///< it is the road; else the scale is a guess
@@ -55,7 +28,7 @@ struct RoadScaleEstimate {
 /// Metres per unit of a monocular odometry from the road: joins the estimators, and frames.
 class RoadScale {
  public:
-  explicit RoadScale(const RoadOptions& options) : options_(options), path_(options) {}
+  explicit RoadScale(const RoadOptions& options) : options_(options) {}
 
   /// One call per frame with an image. `cur_from_prev`: the motion since the
   /// last call, in units of the map (ignored at the first call and after restart()). The filter,
@@ -73,7 +46,9 @@ class RoadScale {
   }
   /// The map was multiplied by `factor` (new units = factor * old units).
   void rescale(double factor) {
-    path_.rescale(factor);
+    for (Eigen::Vector3d& position : path_) {
+      position *= factor;
+    }
     for (Past& past : past_) {
       past.now_from_past.translation *= factor;
     }
@@ -82,7 +57,7 @@ class RoadScale {
   void restart() {
     belief_.restart();
     past_.clear();
-    path_.restart();
+    path_.clear();
     frames_unmeasured_ = 0;
   }
 
@@ -94,6 +69,9 @@ class RoadScale {
   /// The nearest past frame that is far enough away; nullptr where the car did not move.
   [[nodiscard]] const Past* pick_past(const ScaleFilter& filter) const;
   [[nodiscard]] RoadPrior make_prior(const Rigid3& motion, const ScaleFilter& filter) const;
+  /// Fills slope, drop and their information: y = y0 + slope z + drop / height z^2 through the
+  /// path, y0: the current vertical bounce.
+  void predict_profile(double metres_per_unit, RoadPrior& prior) const;
   void remember(RoadImage image) {
     past_.push_front({std::move(image), Rigid3{}});
     if (past_.size() > static_cast<std::size_t>(std::max(1, options_.max_frames_apart))) {
@@ -112,7 +90,12 @@ class RoadScale {
              RoadEvidence& evidence) const;
 
   RoadOptions options_;
-  RoadPath path_;
+  /// The way that the camera came, in the current camera, map units; newest first. It lies above
+  /// the road at the camera's height, but for the car's bouncing, and tells the slope and the bend
+  /// of the road under the car, whatever the camera's pitch. Without it a crest ahead looks like a
+  /// larger step (the plane through the road ahead passes closer under the camera than the road
+  /// does): 1 mrad of bend between car and strip is 0.3 % of scale.
+  std::deque<Eigen::Vector3d> path_;
   RoadBelief belief_;
   std::deque<Past> past_;  ///< newest first
   int frames_unmeasured_ = 0;
