@@ -90,12 +90,12 @@ bool project_outline(std::span<const Vec3> points, const Camera& camera, ScreenF
 
 /// nullopt: behind the camera, outside the image, or seen edge-on.
 std::optional<ScreenFace> project_face(const Face& face,
-                                       const Rigid3& scene_from_camera,
+                                       const Vec3& camera_in_scene,
                                        const Eigen::Matrix3d& camera_from_scene,
                                        const Camera& camera) {
   std::array<Vec3, 4> points;
   for (std::size_t i = 0; i < face.num_points; ++i) {
-    points[i] = camera_from_scene * (face.points[i].cast<double>() - scene_from_camera.translation);
+    points[i] = camera_from_scene * (face.points[i].cast<double>() - camera_in_scene);
   }
   ScreenFace out;
   out.style = &face.style;
@@ -315,17 +315,18 @@ struct FramePainter {
 
 }  // namespace
 
-RenderedFrame paint(std::span<const Face* const> faces,
-                    const Rigid3& scene_from_camera,
+RenderedFrame paint(const Scene& scene,
+                    const Rigid3& world_from_camera,
                     const Camera& camera,
                     const Textures& textures,
                     cv::Range rows,
                     double fill) {
   FramePainter painter{
-      camera, textures, scene_from_camera.rotation_matrix(), {}, rows, fill, sample_weights(fill)};
+      camera, textures, world_from_camera.rotation_matrix(), {}, rows, fill, sample_weights(fill)};
+  const Vec3 in_scene = world_from_camera.translation - scene.origin;
   const Eigen::Matrix3d camera_from_scene = painter.world_from_camera.transpose();
-  for (const Face* face : faces) {
-    if (const auto seen = project_face(*face, scene_from_camera, camera_from_scene, camera)) {
+  for (const Face& face : scene.faces) {
+    if (const auto seen = project_face(face, in_scene, camera_from_scene, camera)) {
       painter.faces.push_back(*seen);
     }
   }
