@@ -17,7 +17,6 @@ constexpr int kSubColumns = 2;
 constexpr int kSamples = kSubRows * kSubColumns;
 /// The samples of sub-row j begin here, in half pixels.
 constexpr std::array<double, kSubRows> kRowShift = {0.125, 0.625, 0.375, 0.875};
-constexpr int kNothing = -1;  ///< in place of a face's index: the backdrop
 
 /// Position of a sample relative to the centre of its pixel, in pixels.
 Vec2 sample(int k) {
@@ -55,11 +54,13 @@ double at(const Vec3& linear, const Vec2& pixel) {
   return linear.x() * pixel.x() + linear.y() * pixel.y() + linear.z();
 }
 
+const Style kBackdrop;
+
 /// A face as the camera sees it. 1/z and texture/z of a plane are linear over the image, which
 /// makes depth and texture exact at every pixel (no interpolation between corners).
 struct ScreenFace {
-  const Style* style = nullptr;
-  Vec3 inverse_z;
+  const Style* style = &kBackdrop;
+  Vec3 inverse_z = Vec3::Zero();
   std::array<Vec3, 2> texture_over_z;
   std::array<Vec2, 5> outline;  ///< pixels, clipped at the near plane
   std::size_t num_points = 0;
@@ -160,14 +161,14 @@ struct FramePainter {
   const Camera& camera;
   const Textures& textures;
   Eigen::Matrix3d world_from_camera;
-  std::vector<ScreenFace> faces;
   cv::Range rows;
   double fill;
-  std::array<float, kSamples> weights;            ///< of a pixel's samples; their sum is 1
-  int band_begin = 0;                             ///< first row of the present band
-  int row_width = camera.width_px * kSubColumns;  ///< samples
-  std::vector<float> inverse_z = {};              ///< per sample of the band
-  std::vector<int> ids = {};                      ///< the same: the nearest face
+  std::array<float, kSamples> weights = sample_weights(fill);  ///< of a pixel's; their sum is 1
+  std::vector<ScreenFace> faces = std::vector<ScreenFace>(1);  ///< the first: the backdrop
+  int band_begin = 0;                                          ///< first row of the present band
+  int row_width = camera.width_px * kSubColumns;               ///< samples
+  std::vector<float> inverse_z = {};                           ///< per sample of the band
+  std::vector<int> ids = {};                                   ///< the same: the nearest face
 
   RenderedFrame paint() {
     const cv::Size size(camera.width_px, rows.size());
@@ -190,7 +191,7 @@ struct FramePainter {
     const int num_sub_rows = (end_row - first_row) * kSubRows;
     const auto count = static_cast<std::size_t>(row_width * num_sub_rows);
     inverse_z.assign(count, 0.0F);  // infinitely far
-    ids.assign(count, kNothing);
+    ids.assign(count, 0);
     const double first_y = first_row + sample(0).y();
     const auto sub_row_from = [&](double y) {
       return first_from((y - first_y) * kSubRows, num_sub_rows);
@@ -245,32 +246,22 @@ struct FramePainter {
           weight += weights[static_cast<std::size_t>(k)];
         }
       }
+      const ScreenFace& face = faces[static_cast<std::size_t>(*first)];
       const Vec2 middle = Vec2(column, row) + sum / count;
-      light += colour_of(*first, middle) * weight;
+      light += colour_of(face, middle) * weight;
       if (count > max_count) {
         max_count = count;
         frame.depth_m.at<float>(row - rows.start, column) =
-            depth_of(*first, Vec2(column, row), middle);
-        frame.moving.at<uchar>(row - rows.start, column) = moves(*first) ? 255 : 0;
+            depth_of(face, Vec2(column, row), middle);
+        frame.moving.at<uchar>(row - rows.start, column) = face.style->moves ? 255 : 0;
       }
     }
     frame.rgb.at<cv::Vec3f>(row - rows.start, column) = light;
   }
 
-  [[nodiscard]] bool moves(int id) const {
-    return id != kNothing && faces[static_cast<std::size_t>(id)].style->moves;
-  }
-
-  [[nodiscard]] cv::Vec3f colour_of(int id, const Vec2& pixel) const {
+  [[nodiscard]] cv::Vec3f colour_of(const ScreenFace& face, const Vec2& pixel) const {
     const Vec2 ray = camera.normalize(pixel);
     const Vec3 direction(ray.x(), ray.y(), 1.0);
-    const auto backdrop = [&] {
-      return to_vector(sky_colour(world_from_camera * direction, 1.0 / camera.fx_px, textures));
-    };
-    if (id == kNothing) {
-      return backdrop();
-    }
-    const ScreenFace& face = faces[static_cast<std::size_t>(id)];
     const double z = 1.0 / at(face.inverse_z, pixel);
     const Material material = face.style->material;
     const Rgb albedo =
@@ -282,7 +273,11 @@ struct FramePainter {
     // Things dissolve into the backdrop and are gone before the drawn part of a street ends:
     // nothing pops up.
     const float far = smooth_step(110.0F, 165.0F, distance_m);
-    return far > 0.0F ? lit * (1.0F - far) + backdrop() * far : lit;
+    if (far == 0.0F) {
+      return lit;
+    }
+    const Rgb backdrop = sky_colour(world_from_camera * direction, 1.0 / camera.fx_px, textures);
+    return lit * (1.0F - far) + to_vector(backdrop) * far;
   }
 
   [[nodiscard]] Sample sample_of(const ScreenFace& face, const Vec2& pixel, double z) const {
@@ -301,13 +296,11 @@ struct FramePainter {
 
   /// At the pixel's centre on the plane of the face; if that point is far off the part of the face
   /// the pixel really sees (an outline seen at a grazing angle), at the middle of that part.
-  [[nodiscard]] float depth_of(int id, const Vec2& pixel, const Vec2& middle) const {
-    if (id == kNothing) {
-      return std::numeric_limits<float>::infinity();
-    }
-    const Vec3& over_image = faces[static_cast<std::size_t>(id)].inverse_z;
-    const double seen = at(over_image, middle);
-    const double centre = at(over_image, pixel);
+  [[nodiscard]] static float depth_of(const ScreenFace& face,
+                                      const Vec2& pixel,
+                                      const Vec2& middle) {
+    const double seen = at(face.inverse_z, middle);
+    const double centre = at(face.inverse_z, pixel);
     const bool is_near = std::abs(centre - seen) <= 0.1 * seen;
     return static_cast<float>(1.0 / (is_near ? centre : seen));
   }
@@ -321,8 +314,7 @@ RenderedFrame paint(const Scene& scene,
                     const Textures& textures,
                     cv::Range rows,
                     double fill) {
-  FramePainter painter{
-      camera, textures, world_from_camera.rotation_matrix(), {}, rows, fill, sample_weights(fill)};
+  FramePainter painter{camera, textures, world_from_camera.rotation_matrix(), rows, fill};
   const Vec3 in_scene = world_from_camera.translation - scene.origin;
   const Eigen::Matrix3d camera_from_scene = painter.world_from_camera.transpose();
   for (const Face& face : scene.faces) {
