@@ -24,54 +24,24 @@ constexpr Rgb kGlass = {0.07F, 0.08F, 0.09F};
 constexpr Rgb kPlate = {0.85F, 0.85F, 0.82F};
 constexpr Rgb kShadow = {0.07F, 0.07F, 0.075F};  // what the sky cannot reach
 
-void add_parts(const RoadFrame& axes,
-               const Vec3& origin,
+void add_parts(const RoadFrame& at,
                std::span<const Part> parts,
                const Style& common,
                Scene& scene) {
   Style style = common;
   for (const Part& part : parts) {
-    const Vec3 at = origin + part.corner.x() * axes.forward + part.corner.y() * axes.right +
-                    part.corner.z() * axes.up;
+    const Vec3 corner = at.position + part.corner.x() * at.forward + part.corner.y() * at.right +
+                        part.corner.z() * at.up;
     style.albedo = part.albedo;
     style.material = part.material;
-    scene.add_box(
-        at, {part.size.x() * axes.forward, part.size.y() * axes.right, part.size.z() * axes.up},
-        style);
+    scene.add_box(corner,
+                  {part.size.x() * at.forward, part.size.y() * at.right, part.size.z() * at.up},
+                  style);
   }
 }
 
 Part shadow(double length_m, double width_m) {
   return {kShadow, {-0.1, -0.1 - 0.5 * width_m, 0.0}, {length_m + 0.2, width_m + 0.2, 0.015}};
-}
-
-/// `body`: nullptr: plain, seen from behind; else with a face in front, too.
-void add_any_car(
-    const RoadFrame& axes, const Vec3& origin, Draw draw, Material body, bool moves, Scene& scene) {
-  const float gray = draw.in_float(0.05, 0.75);
-  const float tint = draw.in_float(-0.12, 0.12);
-  const Rgb paint = {gray + std::max(tint, 0.0F), gray, gray + std::max(-tint, 0.0F)};
-  const std::uint32_t seed = draw.bits();
-  const double width = draw.in(1.65, 1.8);
-  const double length = draw.in(3.9, 4.7);
-  const auto across = [&](double right_of_left_side) { return right_of_left_side - 0.5 * width; };
-  std::vector<Part> parts = {
-      {paint, {0.0, across(0.0), 0.3}, {length, width, 0.52}, body},
-      {kGlass, {0.12 * length, across(0.09), 0.82}, {0.55 * length, width - 0.18, 0.5}},
-      {paint, {0.2 * length, across(0.12), 1.32}, {0.38 * length, width - 0.24, 0.1}, body},
-      {kTyre, {0.12 * length, across(-0.02), 0.0}, {0.6, width + 0.04, 0.58}},
-      {kTyre, {0.72 * length, across(-0.02), 0.0}, {0.6, width + 0.04, 0.58}},
-      {kTailLamp, {-0.02, across(0.05), 0.62}, {0.02, 0.3, 0.14}},
-      {kTailLamp, {-0.02, across(width - 0.35), 0.62}, {0.02, 0.3, 0.14}},
-      {kPlate, {-0.02, across(0.5 * width - 0.26), 0.5}, {0.02, 0.52, 0.11}},
-      shadow(length, width)};
-  if (body != nullptr) {
-    const double side = 0.5 * width;
-    parts.insert(parts.end(), {{kHeadLamp, {length, 0.05 - side, 0.58}, {0.02, 0.36, 0.16}},
-                               {kHeadLamp, {length, side - 0.41, 0.58}, {0.02, 0.36, 0.16}},
-                               {kTyre, {length, 0.45 - side, 0.45}, {0.015, width - 0.9, 0.2}}});
-  }
-  add_parts(axes, origin, parts, {.seed = seed, .moves = moves}, scene);
 }
 
 Rgb any_paint(Draw& draw) {
@@ -103,13 +73,32 @@ void add_lights(const RoadFrame& middle, Scene& scene) {
 
 }  // namespace
 
-void add_parked_car(const RoadFrame& place, Draw draw, Scene& scene) {
-  constexpr double kLateral_m = 3.35;
-  add_any_car(place, place.point(kLateral_m, 0.0), draw, nullptr, false, scene);
-}
-
-void add_car(const RoadFrame& at, Draw draw, bool moves, Scene& scene) {
-  add_any_car(at, at.position, draw, materials::bodywork, moves, scene);
+void add_car(const RoadFrame& at, Draw draw, bool moves, Scene& scene, bool is_parked) {
+  const Material body = is_parked ? nullptr : materials::bodywork;
+  const float gray = draw.in_float(0.05, 0.75);
+  const float tint = draw.in_float(-0.12, 0.12);
+  const Rgb paint = {gray + std::max(tint, 0.0F), gray, gray + std::max(-tint, 0.0F)};
+  const std::uint32_t seed = draw.bits();
+  const double width = draw.in(1.65, 1.8);
+  const double length = draw.in(3.9, 4.7);
+  const auto across = [&](double right_of_left_side) { return right_of_left_side - 0.5 * width; };
+  std::vector<Part> parts = {
+      {paint, {0.0, across(0.0), 0.3}, {length, width, 0.52}, body},
+      {kGlass, {0.12 * length, across(0.09), 0.82}, {0.55 * length, width - 0.18, 0.5}},
+      {paint, {0.2 * length, across(0.12), 1.32}, {0.38 * length, width - 0.24, 0.1}, body},
+      {kTyre, {0.12 * length, across(-0.02), 0.0}, {0.6, width + 0.04, 0.58}},
+      {kTyre, {0.72 * length, across(-0.02), 0.0}, {0.6, width + 0.04, 0.58}},
+      {kTailLamp, {-0.02, across(0.05), 0.62}, {0.02, 0.3, 0.14}},
+      {kTailLamp, {-0.02, across(width - 0.35), 0.62}, {0.02, 0.3, 0.14}},
+      {kPlate, {-0.02, across(0.5 * width - 0.26), 0.5}, {0.02, 0.52, 0.11}},
+      shadow(length, width)};
+  if (!is_parked) {
+    const double side = 0.5 * width;
+    parts.insert(parts.end(), {{kHeadLamp, {length, 0.05 - side, 0.58}, {0.02, 0.36, 0.16}},
+                               {kHeadLamp, {length, side - 0.41, 0.58}, {0.02, 0.36, 0.16}},
+                               {kTyre, {length, 0.45 - side, 0.45}, {0.015, width - 0.9, 0.2}}});
+  }
+  add_parts(at, parts, {.seed = seed, .moves = moves}, scene);
 }
 
 void add_lorry(const RoadFrame& at, Draw draw, bool moves, Scene& scene) {
@@ -137,7 +126,7 @@ void add_lorry(const RoadFrame& at, Draw draw, bool moves, Scene& scene) {
       {kTailLamp, {-0.02, -kLeft_m - 0.55, 0.75}, {0.02, 0.45, 0.16}},
       shadow(kLorryLength_m, kWidth_m),
   }};
-  add_parts(at, at.position, parts, common, scene);
+  add_parts(at, parts, common, scene);
 }
 
 void add_person(const RoadFrame& at, Draw draw, double stride_rad, bool moves, Scene& scene) {
@@ -151,7 +140,7 @@ void add_person(const RoadFrame& at, Draw draw, double stride_rad, bool moves, S
       {skin, {-0.1, -0.09, 1.48 * tall}, {0.2, 0.18, 0.25}, materials::cloth},
       shadow(0.3, 0.35),
   }};
-  add_parts(at, at.position, body, common, scene);
+  add_parts(at, body, common, scene);
   // Legs and arms lean forward and back by turns.
   const double swing_m = 0.3 * std::sin(stride_rad);
   const auto add_limb = [&](double side_m, double top_m, double length_m, double reach_m,

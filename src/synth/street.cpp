@@ -314,9 +314,10 @@ void add_poles(const Street& street) {
 void add_parked_cars(const Street& street) {
   street.for_each_slot(6.5, [&](int slot, double arc_m) {
     Draw draw(street.seed, 'C', slot);
-    const auto place = street.roomy(arc_m + draw.in(0.5, 1.4), 1.0, 0.95);
+    auto place = street.roomy(arc_m + draw.in(0.5, 1.4), 1.0, 0.95);
     if (place && draw.chance(0.3)) {
-      add_parked_car(*place, draw, street.scene);
+      place->position = place->point(3.35, 0.0);  // at the kerb on the right
+      add_car(*place, draw, false, street.scene, true);
     }
   });
 }
