@@ -15,6 +15,7 @@ struct Part {
   Vec3 corner;
   Vec3 size;
   Material material = nullptr;
+  double lean_m = 0.0;  ///< its top is so far behind its foot
 };
 
 constexpr Rgb kTyre = {0.03F, 0.03F, 0.03F};
@@ -35,7 +36,8 @@ void add_parts(const RoadFrame& at,
     style.albedo = part.albedo;
     style.material = part.material;
     scene.add_box(corner,
-                  {part.size.x() * at.forward, part.size.y() * at.right, part.size.z() * at.up},
+                  {part.size.x() * at.forward, part.size.y() * at.right,
+                   part.size.z() * at.up - part.lean_m * at.forward},
                   style);
   }
 }
@@ -135,29 +137,23 @@ void add_person(const RoadFrame& at, Draw draw, double stride_rad, bool moves, S
   const Rgb trousers = scaled(any_paint(draw), 0.5F);
   const Style common{.seed = draw.bits(), .moves = moves};
   const Rgb skin = {0.5F, 0.36F, 0.28F};
-  const std::array<Part, 3> body = {{
+  // Legs and arms lean forward and back by turns.
+  const double swing_m = 0.3 * std::sin(stride_rad);
+  const auto limb = [](double side_m, double top_m, double length_m, double reach_m,
+                       const Rgb& colour, double width_m) {
+    const Vec3 foot(reach_m - 0.5 * width_m, side_m - 0.5 * width_m, top_m - length_m);
+    return Part{colour, foot, {width_m, width_m, length_m}, materials::cloth, reach_m};
+  };
+  const std::array<Part, 7> body = {{
       {coat, {-0.12, -0.22, 0.82 * tall}, {0.24, 0.44, 0.62 * tall}, materials::cloth},
       {skin, {-0.1, -0.09, 1.48 * tall}, {0.2, 0.18, 0.25}, materials::cloth},
       shadow(0.3, 0.35),
+      limb(-0.11, 0.85 * tall, 0.84 * tall, swing_m, trousers, 0.16),
+      limb(0.11, 0.85 * tall, 0.84 * tall, -swing_m, trousers, 0.16),
+      limb(-0.28, 1.4 * tall, 0.6 * tall, -swing_m, coat, 0.1),
+      limb(0.28, 1.4 * tall, 0.6 * tall, swing_m, coat, 0.1),
   }};
   add_parts(at, body, common, scene);
-  // Legs and arms lean forward and back by turns.
-  const double swing_m = 0.3 * std::sin(stride_rad);
-  const auto add_limb = [&](double side_m, double top_m, double length_m, double reach_m,
-                            const Rgb& colour, double width_m) {
-    Style style = common;
-    style.albedo = colour;
-    style.material = materials::cloth;
-    const Vec3 foot = at.position + (reach_m - 0.5 * width_m) * at.forward +
-                      (side_m - 0.5 * width_m) * at.right + (top_m - length_m) * at.up;
-    scene.add_box(
-        foot, {width_m * at.forward, width_m * at.right, length_m * at.up - reach_m * at.forward},
-        style);
-  };
-  add_limb(-0.11, 0.85 * tall, 0.84 * tall, swing_m, trousers, 0.16);
-  add_limb(0.11, 0.85 * tall, 0.84 * tall, -swing_m, trousers, 0.16);
-  add_limb(-0.28, 1.4 * tall, 0.6 * tall, -swing_m, coat, 0.1);
-  add_limb(0.28, 1.4 * tall, 0.6 * tall, swing_m, coat, 0.1);
 }
 
 void House::add_walls(double height_m) {
