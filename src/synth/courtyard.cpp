@@ -52,7 +52,7 @@ struct Stand {
 Style any_colour(Draw& draw) {
   const float light = draw.in_float(0.12, 0.75);
   Style style;
-  for (float& value : style.albedo) {
+  for (float& value : style.albedo.val) {
     value = light * draw.in_float(0.5, 1.2);
   }
   return style;
@@ -69,7 +69,7 @@ Style brick_style(Draw& draw) {
 Style board_style(Draw& draw) {
   return {.material = materials::boards,
           .seed = draw.bits(),
-          .albedo = scaled({0.42F, 0.32F, 0.21F}, draw.in_float(0.6, 1.3))};
+          .albedo = Rgb{0.42F, 0.32F, 0.21F} * draw.in_float(0.6, 1.3)};
 }
 
 Style hedge_style(Draw& draw) {
@@ -241,7 +241,7 @@ void add_wall_part(const Stand& stand, double width_m, std::size_t kind, Draw dr
   const auto& [min_height_m, max_height_m, own_style] = kWallKinds[kind];
   const double relief_m = draw.in(0.0, kMaxRelief_m);
   Style style{.material = materials::plain_wall, .seed = draw.bits()};
-  style.albedo = scaled({0.48F, 0.45F, 0.38F}, draw.in_float(0.85, 1.15));
+  style.albedo = Rgb{0.48F, 0.45F, 0.38F} * draw.in_float(0.85, 1.15);
   if (own_style != nullptr) {
     style = own_style(draw);
   }

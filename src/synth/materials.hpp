@@ -92,7 +92,7 @@ struct Sample {
 };
 
 /// Colour of the air.
-inline constexpr Rgb kHaze = {0.60F, 0.63F, 0.66F};
+inline const Rgb kHaze = {0.60F, 0.63F, 0.66F};
 
 /// The backdrop: blue with thin clouds, wooded hills on the horizon, fields below it. It is
 /// infinitely far and moves with the camera's rotation only. `direction` in world axes (-y up), any

@@ -18,12 +18,12 @@ struct Part {
   double lean_m = 0.0;  ///< its top is so far behind its foot
 };
 
-constexpr Rgb kTyre = {0.03F, 0.03F, 0.03F};
-constexpr Rgb kTailLamp = {0.6F, 0.12F, 0.1F};
-constexpr Rgb kHeadLamp = {0.8F, 0.8F, 0.76F};
-constexpr Rgb kGlass = {0.07F, 0.08F, 0.09F};
-constexpr Rgb kPlate = {0.85F, 0.85F, 0.82F};
-constexpr Rgb kShadow = {0.07F, 0.07F, 0.075F};  // what the sky cannot reach
+const Rgb kTyre = {0.03F, 0.03F, 0.03F};
+const Rgb kTailLamp = {0.6F, 0.12F, 0.1F};
+const Rgb kHeadLamp = {0.8F, 0.8F, 0.76F};
+const Rgb kGlass = {0.07F, 0.08F, 0.09F};
+const Rgb kPlate = {0.85F, 0.85F, 0.82F};
+const Rgb kShadow = {0.07F, 0.07F, 0.075F};  // what the sky cannot reach
 
 void add_parts(const RoadFrame& at,
                std::span<const Part> parts,
@@ -134,7 +134,7 @@ void add_lorry(const RoadFrame& at, Draw draw, bool moves, Scene& scene) {
 void add_person(const RoadFrame& at, Draw draw, double stride_rad, bool moves, Scene& scene) {
   const double tall = draw.in(0.92, 1.08);
   const Rgb coat = any_paint(draw);
-  const Rgb trousers = scaled(any_paint(draw), 0.5F);
+  const Rgb trousers = any_paint(draw) * 0.5F;
   const Style common{.seed = draw.bits(), .moves = moves};
   const Rgb skin = {0.5F, 0.36F, 0.28F};
   // Legs and arms lean forward and back by turns.
@@ -230,7 +230,7 @@ void add_side_streets(const RoadFrame& middle, std::uint64_t seed, Scene& scene)
         -Vec3::UnitY(),
         {.material = materials::facade, .seed = draw.bits()},
         scene};
-    house.style.albedo = scaled({0.72F, 0.64F, 0.48F}, draw.in_float(0.7, 1.2));
+    house.style.albedo = Rgb{0.72F, 0.64F, 0.48F} * draw.in_float(0.7, 1.2);
     house.add_walls(wall);
     house.add_roof(wall, 2.4, draw.bits());
   }

@@ -14,7 +14,7 @@ void add_lorry(const RoadFrame& at, Draw draw, bool moves, Scene& scene);
 /// `stride_rad`: how far the steps are; a person who stands keeps it.
 void add_person(const RoadFrame& at, Draw draw, double stride_rad, bool moves, Scene& scene);
 
-inline constexpr Rgb kAsphalt = {0.345F, 0.345F, 0.35F};
+inline const Rgb kAsphalt = {0.345F, 0.345F, 0.35F};
 /// Half the width of the road that crosses.
 inline constexpr int kCrossingHalf_m = 4;
 /// It ends so far from the street's middle, at a house.

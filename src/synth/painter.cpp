@@ -155,8 +155,6 @@ int first_from(double value, int end) {
   return static_cast<int>(std::ceil(std::clamp(value, 0.0, static_cast<double>(end))));
 }
 
-cv::Vec3f to_vector(const Rgb& colour) { return {colour[0], colour[1], colour[2]}; }
-
 struct FramePainter {
   const Camera& camera;
   const Textures& textures;
@@ -268,8 +266,7 @@ struct FramePainter {
         material == nullptr ? face.style->albedo : material(sample_of(face, pixel, z));
     const auto distance_m = static_cast<float>(z * direction.norm());
     const float haze = 1.0F - std::exp(-distance_m / 700.0F);
-    const cv::Vec3f lit =
-        to_vector(albedo) * (face.style->light * (1.0F - haze)) + to_vector(kHaze) * haze;
+    const cv::Vec3f lit = albedo * (face.style->light * (1.0F - haze)) + kHaze * haze;
     // Things dissolve into the backdrop and are gone before the drawn part of a street ends:
     // nothing pops up.
     const float far = smooth_step(110.0F, 165.0F, distance_m);
@@ -277,7 +274,7 @@ struct FramePainter {
       return lit;
     }
     const Rgb backdrop = sky_colour(world_from_camera * direction, 1.0 / camera.fx_px, textures);
-    return lit * (1.0F - far) + to_vector(backdrop) * far;
+    return lit * (1.0F - far) + backdrop * far;
   }
 
   [[nodiscard]] Sample sample_of(const ScreenFace& face, const Vec2& pixel, double z) const {

@@ -121,20 +121,20 @@ void add_ground(const Street& street) {
     Material material;  ///< of the strip to its right
     Rgb albedo;
   };
-  constexpr Rgb kStone = {0.46F, 0.445F, 0.42F};
-  constexpr Rgb kPaving = {0.43F, 0.41F, 0.39F};
-  constexpr Rgb kGreen = {0.24F, 0.32F, 0.13F};
+  const Rgb kStone = {0.46F, 0.445F, 0.42F};
+  const Rgb kPaving = {0.43F, 0.41F, 0.39F};
+  const Rgb kGreen = {0.24F, 0.32F, 0.13F};
   constexpr double kKerb_m = 0.12;
-  constexpr std::array<Line, 10> kLines = {{{-kStreetHalfWidth_m, 0.25, materials::grass, kGreen},
-                                            {-7.2, kKerb_m, materials::sidewalk, kPaving},
-                                            {-5.35, kKerb_m, materials::kerb, kStone},
-                                            {-5.2, kKerb_m, materials::kerb, kStone},
-                                            {-5.2, 0.0, materials::asphalt, kAsphalt},
-                                            {2.2, 0.0, materials::parking, {0.38F, 0.365F, 0.355F}},
-                                            {4.4, 0.0, materials::kerb, kStone},
-                                            {4.4, kKerb_m, materials::sidewalk, kPaving},
-                                            {6.6, kKerb_m, materials::grass, kGreen},
-                                            {kStreetHalfWidth_m, 0.25, nullptr, {}}}};
+  const std::array<Line, 10> kLines = {{{-kStreetHalfWidth_m, 0.25, materials::grass, kGreen},
+                                        {-7.2, kKerb_m, materials::sidewalk, kPaving},
+                                        {-5.35, kKerb_m, materials::kerb, kStone},
+                                        {-5.2, kKerb_m, materials::kerb, kStone},
+                                        {-5.2, 0.0, materials::asphalt, kAsphalt},
+                                        {2.2, 0.0, materials::parking, {0.38F, 0.365F, 0.355F}},
+                                        {4.4, 0.0, materials::kerb, kStone},
+                                        {4.4, kKerb_m, materials::sidewalk, kPaving},
+                                        {6.6, kKerb_m, materials::grass, kGreen},
+                                        {kStreetHalfWidth_m, 0.25, nullptr, {}}}};
   for (auto left = kLines.begin(); left + 1 != kLines.end(); ++left) {
     const auto right = left + 1;
     const Style style{.material = left->material,
@@ -172,9 +172,9 @@ void add_ground(const Street& street) {
 
 /// Hedge, garden wall or fence at the outer edges, a new kind every 16 m or so.
 void add_borders(const Street& street) {
-  constexpr Style kHedge{.material = materials::hedge, .albedo = {0.15F, 0.22F, 0.09F}};
-  constexpr Style kWall{.material = materials::plain_wall, .albedo = {0.55F, 0.52F, 0.48F}};
-  constexpr Style kFence{.material = materials::fence, .albedo = {0.33F, 0.25F, 0.17F}};
+  const Style kHedge{.material = materials::hedge, .albedo = {0.15F, 0.22F, 0.09F}};
+  const Style kWall{.material = materials::plain_wall, .albedo = {0.55F, 0.52F, 0.48F}};
+  const Style kFence{.material = materials::fence, .albedo = {0.33F, 0.25F, 0.17F}};
   for (const double side : {-1.0, 1.0}) {
     const double lateral_m = side * kStreetHalfWidth_m;
     for (int i = street.window.start; i + 1 < street.window.end; ++i) {
@@ -198,14 +198,14 @@ void add_borders(const Street& street) {
 }
 
 constexpr double kLot_m = 16.0;
-constexpr std::array<Rgb, 8> kPlaster = {{{0.78F, 0.76F, 0.70F},
-                                          {0.72F, 0.64F, 0.48F},
-                                          {0.62F, 0.60F, 0.57F},
-                                          {0.66F, 0.52F, 0.42F},
-                                          {0.50F, 0.33F, 0.26F},
-                                          {0.80F, 0.74F, 0.58F},
-                                          {0.56F, 0.60F, 0.63F},
-                                          {0.44F, 0.42F, 0.40F}}};
+const std::array<Rgb, 8> kPlaster = {{{0.78F, 0.76F, 0.70F},
+                                      {0.72F, 0.64F, 0.48F},
+                                      {0.62F, 0.60F, 0.57F},
+                                      {0.66F, 0.52F, 0.42F},
+                                      {0.50F, 0.33F, 0.26F},
+                                      {0.80F, 0.74F, 0.58F},
+                                      {0.56F, 0.60F, 0.63F},
+                                      {0.44F, 0.42F, 0.40F}}};
 
 void add_building(const Street& street, Draw draw, double side, double arc_m) {
   if (!draw.chance(0.72)) {
@@ -231,7 +231,7 @@ void add_building(const Street& street, Draw draw, double side, double arc_m) {
   const double eaves_m = 0.6 + 2.9 * floors;
   house.style.seed = draw.bits();
   house.style.albedo = kPlaster[draw.bits() % kPlaster.size()];
-  house.style.albedo = scaled(house.style.albedo, draw.in_float(0.85, 1.2));
+  house.style.albedo = house.style.albedo * draw.in_float(0.85, 1.2);
   house.add_walls(eaves_m);
   const std::uint32_t roof_seed = draw.bits();
   house.add_roof(eaves_m, draw.in(1.6, 3.2), roof_seed);
