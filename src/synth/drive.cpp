@@ -3,27 +3,25 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <functional>
+
+#include <opencv2/imgproc.hpp>
 
 namespace stemvo::synth {
 namespace {
 
 /// Smallest value within `reach` knots, then the mean over the same reach: smooth and never above
 /// the input, because every value in the mean already is a minimum over a window with this knot.
-std::vector<double> smooth_lower_bound(const std::vector<double>& values, std::ptrdiff_t reach) {
+std::vector<double> smooth_lower_bound(const std::vector<double>& values, int reach) {
+  const cv::Mat window = cv::Mat::ones(1, 2 * reach + 1, CV_64F);
   std::vector<double> lowest;
-  std::vector<double> result;
-  const auto n = std::ssize(values);
-  for (std::ptrdiff_t i = 0; i < n; ++i) {
-    lowest.push_back(*std::min_element(values.begin() + std::max(i - reach, 0L),
-                                       values.begin() + std::min(i + reach + 1, n)));
-  }
-  for (std::ptrdiff_t i = 0; i < n; ++i) {
-    const auto begin = lowest.begin() + std::max(i - reach, 0L);
-    const auto end = lowest.begin() + std::min(i + reach + 1, n);
-    result.push_back(std::accumulate(begin, end, 0.0) / static_cast<double>(end - begin));
-  }
-  return result;
+  std::vector<double> sum;
+  std::vector<double> count(values.size(), 1.0);  // fewer at the ends
+  cv::erode(values, lowest, window);
+  cv::filter2D(lowest, sum, -1, window, {-1, -1}, 0.0, cv::BORDER_CONSTANT);
+  cv::filter2D(count, count, -1, window, {-1, -1}, 0.0, cv::BORDER_CONSTANT);
+  std::ranges::transform(sum, count, sum.begin(), std::divides());
+  return sum;
 }
 
 /// In a bend of radius R the inner edge of the street must stay well inside R or the ribbon folds
@@ -51,16 +49,10 @@ constexpr double kMaxSpeed_m_s = 12.0;
 
 /// Twice over: smooth, with smooth derivatives.
 std::vector<double> smooth(std::vector<double> values, int reach) {
-  const int n = static_cast<int>(values.size());
+  const cv::Mat window = cv::Mat::ones(1, 2 * reach + 1, CV_64F);
   for (int pass = 0; pass < 2; ++pass) {
-    const std::vector<double> from = values;
-    for (int i = 0; i < n; ++i) {
-      double sum = 0.0;
-      for (int k = -reach; k <= reach; ++k) {
-        sum += from[static_cast<std::size_t>(std::clamp(i + k, 0, n - 1))];
-      }
-      values[static_cast<std::size_t>(i)] = sum / (2 * reach + 1);
-    }
+    cv::filter2D(values, values, -1, window, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
+    cv::divide(values, static_cast<double>(window.cols), values);
   }
   return values;
 }
