@@ -34,10 +34,6 @@ class Ripmap {
   std::array<std::array<cv::Mat, kLevels>, kLevels> levels_;  // [v][u]
 };
 
-/// Sum of value noise over octaves: `amplitudes[k]` at a wavelength of 2^k texels.
-[[nodiscard]] std::vector<float> octave_noise(std::uint64_t seed,
-                                              const std::vector<double>& amplitudes);
-
 /// Every material and the sky are painted from these.
 struct Textures {
   explicit Textures(std::uint64_t seed);
