@@ -137,17 +137,14 @@ void add_ground(const Street& street) {
                                         {kStreetHalfWidth_m, 0.25, nullptr, {}}}};
   for (auto left = kLines.begin(); left + 1 != kLines.end(); ++left) {
     const auto right = left + 1;
-    const Style style{.material = left->material,
-                      .seed = static_cast<std::uint32_t>(hash_of(street.seed, 'G')),
-                      .albedo = left->albedo};
-    Style crossed = style;
-    crossed.material = materials::asphalt;
-    crossed.albedo = kAsphalt;
     for (int i = street.window.start; i + 1 < street.window.end; ++i) {
       const bool is_crossed = street.is_crossed(i);
       if (is_crossed && left->lateral_m == right->lateral_m) {
         continue;
       }
+      const Style style{.material = is_crossed ? materials::asphalt : left->material,
+                        .seed = static_cast<std::uint32_t>(hash_of(street.seed, 'G')),
+                        .albedo = is_crossed ? kAsphalt : left->albedo};
       const double low_m = is_crossed ? 0.0 : left->height_m;
       const double high_m = is_crossed ? 0.0 : right->height_m;
       add_segment(street, i,
@@ -155,7 +152,7 @@ void add_ground(const Street& street) {
                     {0, right->lateral_m, high_m},
                     {1, right->lateral_m, high_m},
                     {1, left->lateral_m, low_m}}},
-                  is_crossed ? crossed : style);
+                  style);
       for (const int end : {0, 1}) {  // the strip's end at a crossing road
         if (low_m > 0.0 && street.is_crossed(end == 0 ? i - 1 : i + 1)) {
           add_segment(street, i,
