@@ -156,22 +156,18 @@ void add_person(const RoadFrame& at, Draw draw, double stride_rad, bool moves, S
   add_parts(at, body, common, scene);
 }
 
-void House::add_walls(double height_m) {
+void House::add(double eaves_m, double rise_m, std::uint32_t roof_seed) {
   const auto& [fl, fr, br, bl] = plan;
   const Vec3 down = -kFoundation_m * up;
-  const Vec3 top = height_m * up;
+  const Vec3 top = eaves_m * up;
   for (const auto& [left, right] : {std::pair(fl, fr), std::pair(bl, fl), std::pair(fr, br)}) {
     const double length_m = (right - left).norm();
-    style.size = {static_cast<float>(length_m), static_cast<float>(height_m)};
+    style.size = {static_cast<float>(length_m), static_cast<float>(eaves_m)};
     scene.add_face(
         {left + down, right + down, right + top, left + top},
-        {Vec2(0.0, -kFoundation_m), Vec2(length_m, -kFoundation_m), Vec2(length_m, height_m)},
+        {Vec2(0.0, -kFoundation_m), Vec2(length_m, -kFoundation_m), Vec2(length_m, eaves_m)},
         style);
   }
-}
-
-void House::add_roof(double eaves_m, double rise_m, std::uint32_t seed) {
-  const auto& [fl, fr, br, bl] = plan;
   const Vec3 left_ridge = 0.5 * (fl + bl) + (eaves_m + rise_m) * up;
   const Vec3 right_ridge = 0.5 * (fr + br) + (eaves_m + rise_m) * up;
   const Vec3 over_left = 0.12 * (fl - bl).normalized() - 0.1 * up;
@@ -184,8 +180,8 @@ void House::add_roof(double eaves_m, double rise_m, std::uint32_t seed) {
       {front_left, front_right, right_ridge, left_ridge},
       {Vec2(0, 0), Vec2(length_m, 0), Vec2(length_m, slope_m), Vec2(0, slope_m)},
       {.material = materials::roof,
-       .seed = seed,
-       .albedo = (seed & 1U) != 0U ? Rgb{0.40F, 0.20F, 0.14F} : Rgb{0.24F, 0.23F, 0.23F}});
+       .seed = roof_seed,
+       .albedo = (roof_seed & 1U) != 0U ? Rgb{0.40F, 0.20F, 0.14F} : Rgb{0.24F, 0.23F, 0.23F}});
   style.material = materials::plain_wall;
   for (const auto& [front, back, ridge] :
        {std::tuple(fl, bl, left_ridge), std::tuple(fr, br, right_ridge)}) {
@@ -231,8 +227,7 @@ void add_side_streets(const RoadFrame& middle, std::uint64_t seed, Scene& scene)
         {.material = materials::facade, .seed = draw.bits()},
         scene};
     house.style.albedo = Rgb{0.72F, 0.64F, 0.48F} * draw.in_float(0.7, 1.2);
-    house.add_walls(wall);
-    house.add_roof(wall, 2.4, draw.bits());
+    house.add(wall, 2.4, draw.bits());
   }
   add_lights(middle, scene);
 }

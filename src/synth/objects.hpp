@@ -26,9 +26,8 @@ struct House {
   Style style;
   Scene& scene;
 
-  void add_walls(double height_m);
-  /// A gable roof with its ridge along the street, over the eaves by 12 cm.
-  void add_roof(double eaves_m, double rise_m, std::uint32_t seed);
+  /// Walls, and a gable roof with its ridge along the street, over the eaves by 12 cm.
+  void add(double eaves_m, double rise_m, std::uint32_t roof_seed);
 };
 
 /// The scene beyond the street's edges: the crossing road, hedges along it, houses at its ends, and

@@ -229,9 +229,8 @@ void add_building(const Street& street, Draw draw, double side, double arc_m) {
   house.style.seed = draw.bits();
   house.style.albedo = kPlaster[draw.bits() % kPlaster.size()];
   house.style.albedo = house.style.albedo * draw.in_float(0.85, 1.2);
-  house.add_walls(eaves_m);
   const std::uint32_t roof_seed = draw.bits();
-  house.add_roof(eaves_m, draw.in(1.6, 3.2), roof_seed);
+  house.add(eaves_m, draw.in(1.6, 3.2), roof_seed);
 }
 
 void add_tree(const Street& street, double arc_m, double lateral_m, double size, Draw draw) {
