@@ -307,17 +307,4 @@ void drive_again(std::uint64_t seed, int visit, Drive& drive) {
   }
 }
 
-Daylight daylight(std::uint64_t seed, int visit) {
-  Draw draw = visit == 0 ? Draw(seed, 'L') : Draw(seed, 'L', visit);
-  const double azimuth = draw.in(0.0, 2.0 * kPi);
-  const double height = draw.in(0.6, 0.8);  // rad
-  Daylight light{{std::cos(height) * std::sin(azimuth), -std::sin(height),
-                  std::cos(height) * std::cos(azimuth)}};
-  if (visit != 0) {
-    light.ambient_factor = draw.in(0.8, 1.25);
-    light.gain = draw.in_float(0.75, 1.25);
-  }
-  return light;
-}
-
 }  // namespace stemvo::synth

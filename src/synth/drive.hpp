@@ -135,14 +135,4 @@ struct Walk {
 /// at 0.9 to 1 times the speed, from between the first two frames on.
 void drive_again(std::uint64_t seed, int visit, Drive& drive);
 
-/// Light of a place at one time.
-struct Daylight {
-  Vec3 to_sun;
-  double ambient_factor = 1.0;
-  float gain = 1.0F;  ///< of the camera
-};
-
-/// Visit 0 is the first one.
-[[nodiscard]] Daylight daylight(std::uint64_t seed, int visit);
-
 }  // namespace stemvo::synth

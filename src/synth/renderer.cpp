@@ -20,11 +20,20 @@ Renderer::Renderer(CameraPath path,
       seed_(seed),
       options_(options),
       textures_(seed),
-      daylight_(daylight(seed, options.visit)) {
+      ambient_(std::holds_alternative<Walk>(path_) ? 0.7 : 0.36) {  // walls light each other
   if (const auto* drive = std::get_if<Drive>(&path_); drive != nullptr && options.traffic) {
     traffic_ = plan_traffic(*drive, hash_of(seed, 'T', options.visit));
   }
-  gains_.assign(world_from_camera().size(), daylight_.gain);
+  Draw draw = options.visit == 0 ? Draw(seed, 'L') : Draw(seed, 'L', options.visit);
+  const double azimuth = draw.in(0.0, 2.0 * kPi);
+  const double height = draw.in(0.6, 0.8);  // rad
+  to_sun_ = {std::cos(height) * std::sin(azimuth), -std::sin(height),
+             std::cos(height) * std::cos(azimuth)};
+  gains_.assign(world_from_camera().size(), 1.0F);
+  if (options.visit != 0) {
+    ambient_ *= draw.in(0.8, 1.25);
+    gains_.assign(gains_.size(), draw.in_float(0.75, 1.25));
+  }
   if (options.follows_light) {
     follow_light();
   }
@@ -49,11 +58,8 @@ RenderedFrame Renderer::render(std::size_t index) const {
 }
 
 Scene Renderer::still_scene(std::size_t index) const {
-  const auto* walk = std::get_if<Walk>(&path_);
-  const double ambient = walk != nullptr ? 0.7 : 0.36;  // walls light each other
-  Scene scene{world_from_camera()[index].translation, daylight_.to_sun,
-              ambient * daylight_.ambient_factor};
-  if (walk != nullptr) {
+  Scene scene{world_from_camera()[index].translation, to_sun_, ambient_};
+  if (const auto* walk = std::get_if<Walk>(&path_)) {
     add_courtyard(walk->courtyard, scene);
   } else {
     const auto& drive = std::get<Drive>(path_);

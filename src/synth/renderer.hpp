@@ -57,7 +57,8 @@ class Renderer {
   std::uint64_t seed_;
   RenderOptions options_;
   Textures textures_;
-  Daylight daylight_;
+  Vec3 to_sun_;
+  double ambient_;
   Traffic traffic_;           ///< empty: nothing moves
   std::vector<float> gains_;  ///< per frame
 };
