@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <ranges>
 
 #include <opencv2/imgproc.hpp>
 
@@ -140,21 +141,16 @@ class Driver {
  private:
   /// At the straightest place of the 90 m from `begin_m` on.
   void plan_stop(double begin_m) {
-    constexpr int kAhead = 23;  // knots: a crossing begins there
+    constexpr std::size_t kAhead = 23;  // knots: a crossing begins there
     stand_s_ = draw_.in(4.0, 7.0);
-    double least = 1e9;
-    for (int offset = 0; offset < 90; ++offset) {
-      const int stop = static_cast<int>(begin_m) + offset;
+    const auto stops = std::views::iota(static_cast<std::size_t>(begin_m)) | std::views::take(90);
+    stop_m_ = static_cast<double>(*std::ranges::min_element(stops, {}, [&](std::size_t stop) {
       double most = 0.0;
-      for (int k = stop; k <= stop + kAhead; ++k) {
-        const auto knot = std::min(static_cast<std::size_t>(k), curvature_.size() - 1);
-        most = std::max(most, std::abs(curvature_[knot]));
+      for (std::size_t k = stop; k <= stop + kAhead; ++k) {
+        most = std::max(most, std::abs(curvature_[std::min(k, curvature_.size() - 1)]));
       }
-      if (most < least) {
-        least = most;
-        stop_m_ = stop;
-      }
-    }
+      return most;
+    }));
   }
 
   const std::vector<double>& curvature_;
