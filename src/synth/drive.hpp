@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -67,6 +68,9 @@ class RoadCurve {
     return knots_[static_cast<std::size_t>(index)];
   }
   [[nodiscard]] const std::vector<RoadPart>& parts() const { return parts_; }
+  [[nodiscard]] const RoadPart& part_of(int knot) const {
+    return *std::ranges::upper_bound(parts_, knot, {}, &RoadPart::end);
+  }
   /// Between the knots: position by cubic Hermite, so that a camera on it moves smoothly.
   [[nodiscard]] RoadFrame at(double arc_m) const;
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <functional>
 #include <optional>
 
 #include "synth/drive.hpp"
@@ -40,16 +41,13 @@ struct Street {
     });
   }
   [[nodiscard]] bool is_crossed(int knot) const { return is_crossed(home(knot), home(knot) + 1); }
-  [[nodiscard]] int home(int knot) const { return knot - part_of(knot).shift; }
+  [[nodiscard]] int home(int knot) const { return knot - road.part_of(knot).shift; }
   /// Coordinates of the road's texture, near 0 around the camera.
   [[nodiscard]] double u_m(int knot) const {
-    const auto& [begin, end, shift] = part_of(knot);
+    const auto& [begin, end, shift] = road.part_of(knot);
     const double near_m =
         std::clamp(camera_m, static_cast<double>(begin), static_cast<double>(end)) - shift;
     return knot - shift - std::floor(near_m / kTexturePeriod_m) * kTexturePeriod_m;
-  }
-  [[nodiscard]] const RoadPart& part_of(int knot) const {
-    return *std::ranges::upper_bound(road.parts(), knot, {}, &RoadPart::end);
   }
   /// The same on the left (-1) and on the right (1): build(draw, side, arc_m).
   template <typename Build>
@@ -339,9 +337,7 @@ void add_street(const RoadCurve& road,
   const Street street{road, arc_m, visible_window(road, arc_m), seed, crossings, scene};
   add_ground(street);
   add_borders(street);
-  street.for_each_lot('H', kLot_m, [&](Draw draw, double side, double begin_m) {
-    add_building(street, draw, side, begin_m);
-  });
+  street.for_each_lot('H', kLot_m, std::bind_front(add_building, std::cref(street)));
   add_plants(street);
   add_poles(street);
   add_parked_cars(street);

@@ -119,8 +119,7 @@ class TrafficPlan {
         const int middle = stand.is_behind_lead ? behind_lead : first;
         if (has_room(middle)) {
           stand.crossing = middle;
-          const auto part = std::ranges::upper_bound(road_.parts(), middle, {}, &RoadPart::end);
-          crossings_.push_back(middle - part->shift);
+          crossings_.push_back(middle - road_.part_of(middle).shift);
         }
         stands_.push_back(stand);
       }
