@@ -48,15 +48,6 @@ double Renderer::rate_hz() const {
   return std::holds_alternative<Walk>(path_) ? options_.walk_rate_hz : kDriveRate_hz;
 }
 
-RenderedFrame Renderer::render(std::size_t index) const {
-  RenderedFrame frame = light_of(index);
-  const std::uint64_t noise =
-      hash_of(options_.visit == 0 ? seed_ : hash_of(seed_, 'N', options_.visit), 'n', index);
-  frame.rgb = options_.small_chip ? expose_chip(frame.rgb, gains_[index], noise)
-                                  : expose(frame.rgb, gains_[index], noise);
-  return frame;
-}
-
 Scene Renderer::still_scene(std::size_t index) const {
   Scene scene{world_from_camera()[index].translation, to_sun_, ambient_};
   if (const auto* walk = std::get_if<Walk>(&path_)) {
@@ -68,7 +59,7 @@ Scene Renderer::still_scene(std::size_t index) const {
   return scene;
 }
 
-RenderedFrame Renderer::light_of(std::size_t index) const {
+RenderedFrame Renderer::render(std::size_t index) const {
   constexpr double kMaxBlur_px = 30.0;
   const auto frame_index = static_cast<double>(index);
   const Trajectory& poses = world_from_camera();
@@ -111,6 +102,10 @@ RenderedFrame Renderer::light_of(std::size_t index) const {
       }
     }
   }
+  const std::uint64_t noise =
+      hash_of(options_.visit == 0 ? seed_ : hash_of(seed_, 'N', options_.visit), 'n', index);
+  frame.rgb = options_.small_chip ? expose_chip(frame.rgb, gains_[index], noise)
+                                  : expose(frame.rgb, gains_[index], noise);
   return frame;
 }
 

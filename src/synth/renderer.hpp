@@ -48,8 +48,6 @@ class Renderer {
 
  private:
   [[nodiscard]] Scene still_scene(std::size_t index) const;
-  /// Light on the chip, before the sensor.
-  [[nodiscard]] RenderedFrame light_of(std::size_t index) const;
   void follow_light();
 
   CameraPath path_;
