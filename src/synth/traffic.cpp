@@ -157,12 +157,6 @@ class TrafficPlan {
     return (1.0 - t) * arcs_m_[i] + t * arcs_m_[std::min(i + 1, arcs_m_.size() - 1)];
   }
 
-  [[nodiscard]] double camera_speed_m_s(double time_s) const {
-    constexpr double kSpan_s = 0.5;
-    const double from_s = std::max(0.0, time_s - kSpan_s);
-    return (camera_arc_m(time_s + kSpan_s) - camera_arc_m(from_s)) / (time_s + kSpan_s - from_s);
-  }
-
   [[nodiscard]] double lead_arc_m(const Lead& lead, double time_s) const {
     constexpr double kFar_m = 165.0;  // nothing is seen there
     constexpr double kApproach_s = 30.0;
@@ -179,7 +173,10 @@ class TrafficPlan {
     gap_m *= 1.0 + 0.2 * std::sin(0.08 * arc_m);
     arc_m += gap_m;
     if (time_s > lead.leave_s) {
-      const double begin_m_s = std::clamp(camera_speed_m_s(lead.leave_s), 0.0, kFast_m_s);
+      const double from_s = std::max(0.0, lead.leave_s - 0.5);
+      const double to_s = lead.leave_s + 0.5;
+      const double camera_m_s = (camera_arc_m(to_s) - camera_arc_m(from_s)) / (to_s - from_s);
+      const double begin_m_s = std::clamp(camera_m_s, 0.0, kFast_m_s);
       const double speed_up_s =
           std::min(time_s - lead.leave_s, (kFast_m_s - begin_m_s) / kFaster_m_s2);
       arc_m += begin_m_s * (time_s - lead.leave_s) + 0.5 * kFaster_m_s2 * speed_up_s * speed_up_s +
