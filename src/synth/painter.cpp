@@ -33,14 +33,13 @@ std::array<float, kSamples> sample_weights(double fill) {
   if (fill == 1.0) {
     return weights;
   }
-  const auto overlap = [&](double middle, double width) {
-    const double end = std::min(middle + 0.5 * width, 0.5 * fill);
-    return std::max(0.0, end - std::max(middle - 0.5 * width, -0.5 * fill));
-  };
+  const Vec2 half(0.5, 0.5);
+  const Vec2 half_cell(0.5 / kSubColumns, 0.5 / kSubRows);
+  const Eigen::AlignedBox2d square(-fill * half, fill * half);
   float sum = 0.0F;
   for (int k = 0; k < kSamples; ++k) {
-    const Vec2 at = sample(k);
-    const double area = overlap(at.x(), 1.0 / kSubColumns) * overlap(at.y(), 1.0 / kSubRows);
+    const Eigen::AlignedBox2d cell(sample(k) - half_cell, sample(k) + half_cell);
+    const double area = square.intersection(cell).volume();
     sum += weights[static_cast<std::size_t>(k)] = static_cast<float>(area);
   }
   for (float& weight : weights) {
@@ -168,24 +167,9 @@ struct FramePainter {
   std::vector<float> inverse_z = {};                           ///< per sample of the band
   std::vector<int> ids = {};                                   ///< the same: the nearest face
 
-  RenderedFrame paint() {
-    const cv::Size size(camera.width_px, rows.size());
-    RenderedFrame frame{cv::Mat(size, CV_32FC3), cv::Mat(size, CV_32FC1),
-                        cv::Mat(size, CV_8UC1, cv::Scalar(0))};
-    for (band_begin = rows.start; band_begin < rows.end; band_begin += kBandRows) {
-      const int band_end = std::min(band_begin + kBandRows, rows.end);
-      draw_band(band_begin, band_end);
-      for (int row = band_begin; row < band_end; ++row) {
-        for (int column = 0; column < camera.width_px; ++column) {
-          resolve(column, row, frame);
-        }
-      }
-    }
-    return frame;
-  }
-
   /// For each sample of the rows [first_row, end_row): the nearest face.
   void draw_band(int first_row, int end_row) {
+    band_begin = first_row;
     const int num_sub_rows = (end_row - first_row) * kSubRows;
     const auto count = static_cast<std::size_t>(row_width * num_sub_rows);
     inverse_z.assign(count, 0.0F);  // infinitely far
@@ -249,8 +233,14 @@ struct FramePainter {
       light += colour_of(face, middle) * weight;
       if (count > max_count) {
         max_count = count;
+        // At the pixel's centre on the plane of the face; if that point is far off the part of the
+        // face the pixel really sees (an outline seen at a grazing angle), at the middle of that
+        // part.
+        const double mean = at(face.inverse_z, middle);
+        const double centre = at(face.inverse_z, Vec2(column, row));
+        const bool is_near = std::abs(centre - mean) <= 0.1 * mean;
         frame.depth_m.at<float>(row - rows.start, column) =
-            depth_of(face, Vec2(column, row), middle);
+            static_cast<float>(1.0 / (is_near ? centre : mean));
         frame.moving.at<uchar>(row - rows.start, column) = face.style->moves ? 255 : 0;
       }
     }
@@ -290,17 +280,6 @@ struct FramePainter {
     texture(face.texture_over_z[1], sample.v, sample.width_v);
     return sample;
   }
-
-  /// At the pixel's centre on the plane of the face; if that point is far off the part of the face
-  /// the pixel really sees (an outline seen at a grazing angle), at the middle of that part.
-  [[nodiscard]] static float depth_of(const ScreenFace& face,
-                                      const Vec2& pixel,
-                                      const Vec2& middle) {
-    const double seen = at(face.inverse_z, middle);
-    const double centre = at(face.inverse_z, pixel);
-    const bool is_near = std::abs(centre - seen) <= 0.1 * seen;
-    return static_cast<float>(1.0 / (is_near ? centre : seen));
-  }
 };
 
 }  // namespace
@@ -319,7 +298,19 @@ RenderedFrame paint(const Scene& scene,
       painter.faces.push_back(*seen);
     }
   }
-  return painter.paint();
+  const cv::Size size(camera.width_px, rows.size());
+  RenderedFrame frame{cv::Mat(size, CV_32FC3), cv::Mat(size, CV_32FC1),
+                      cv::Mat(size, CV_8UC1, cv::Scalar(0))};
+  for (int begin = rows.start; begin < rows.end; begin += kBandRows) {
+    const int end = std::min(begin + kBandRows, rows.end);
+    painter.draw_band(begin, end);
+    for (int row = begin; row < end; ++row) {
+      for (int column = 0; column < camera.width_px; ++column) {
+        painter.resolve(column, row, frame);
+      }
+    }
+  }
+  return frame;
 }
 
 }  // namespace stemvo::synth
