@@ -34,20 +34,18 @@ Camera camera_of(const SyntheticDriveOptions& options) {
   return {f_px, f_px, 607.1928 * scale, 185.2157 * height_px / 376.0, width_px, height_px};
 }
 
-Expected<synth::Drive> plan_drive(const SyntheticDriveOptions& options) {
-  if (!options.trajectory) {
-    return synth::make_own_drive(options.num_frames, options.seed, options.render.traffic);
-  }
-  STEMVO_TRY_GET(auto poses, read_kitti_trajectory(*options.trajectory));
-  poses.resize(std::min(poses.size(), static_cast<std::size_t>(options.num_frames)));
-  return synth::make_drive_along(poses);
-}
-
 Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
   if (options.walk) {
     return synth::make_walk(options.num_frames, options.seed, options.render);
   }
-  STEMVO_TRY_GET(auto drive, plan_drive(options));
+  Trajectory given;
+  if (options.trajectory) {
+    STEMVO_TRY_GET(given, read_kitti_trajectory(*options.trajectory));
+    given.resize(std::min(given.size(), static_cast<std::size_t>(options.num_frames)));
+  }
+  synth::Drive drive = options.trajectory ? synth::make_drive_along(given)
+                                          : synth::make_own_drive(options.num_frames, options.seed,
+                                                                  options.render.traffic);
   if (options.render.visit > 0) {
     synth::drive_again(options.seed, options.render.visit, drive);
   }
