@@ -46,8 +46,6 @@ void squeeze_in_turns(std::vector<RoadFrame>& knots) {
   }
 }
 
-constexpr double kMaxSpeed_m_s = 12.0;
-
 /// Twice over: smooth, with smooth derivatives.
 std::vector<double> smooth(std::vector<double> values, int reach) {
   const cv::Mat window = cv::Mat::ones(1, 2 * reach + 1, CV_64F);
@@ -101,18 +99,6 @@ RoadCurve lay_road(const std::vector<double>& curvature, std::uint64_t seed) {
     heading_rad += bend;
   }
   return RoadCurve(path);
-}
-
-/// Metres per second at each knot: slower in turns, changing gently.
-std::vector<double> plan_speed(const std::vector<double>& curvature) {
-  constexpr double kMinSpeed_m_s = 8.0;
-  constexpr double kComfortable_m_s2 = 3.0;
-  std::vector<double> speed;
-  for (const double bend : curvature) {
-    const double limit = std::sqrt(kComfortable_m_s2 / std::max(std::abs(bend), 1e-6));
-    speed.push_back(std::clamp(limit, kMinSpeed_m_s, kMaxSpeed_m_s));
-  }
-  return smooth(speed, 10);
 }
 
 class Driver {
@@ -262,10 +248,18 @@ Rigid3 pose_at(const Trajectory& poses, double frame) {
 
 Drive make_own_drive(int num_frames, std::uint64_t seed, bool stops) {
   constexpr double kInterval_s = 1.0 / kDriveRate_hz;
+  constexpr double kMinSpeed_m_s = 8.0;
+  constexpr double kMaxSpeed_m_s = 12.0;
+  constexpr double kComfortable_m_s2 = 3.0;
   const double longest_m = kMaxSpeed_m_s * kInterval_s * num_frames;
   const auto num_knots = static_cast<std::size_t>(kRoadBehind_m + longest_m + kRoadAhead_m);
   const auto curvature = draw_curvature(num_knots, seed);
-  const auto speed = plan_speed(curvature);
+  std::vector<double> speed;  // m/s at each knot: slower in turns, changing gently
+  for (const double bend : curvature) {
+    const double limit = std::sqrt(kComfortable_m_s2 / std::max(std::abs(bend), 1e-6));
+    speed.push_back(std::clamp(limit, kMinSpeed_m_s, kMaxSpeed_m_s));
+  }
+  speed = smooth(speed, 10);
   Drive drive{lay_road(curvature, seed), {}, {}};
   const CarBody body{seed};
   double arc_m = kRoadBehind_m;
