@@ -15,16 +15,6 @@ constexpr double kSeenBehind_m = 25.0;
 constexpr double kSeenAhead_m = 170.0;
 constexpr double kMoving_m_s = 0.02;
 
-std::vector<double> exact_arcs(const Drive& drive) {
-  std::vector<double> arcs_m;
-  for (std::size_t i = 0; i < drive.arcs_m.size(); ++i) {
-    const RoadFrame road = drive.road.at(drive.arcs_m[i]);
-    const Vec3 offset = drive.world_from_camera[i].translation - road.position;
-    arcs_m.push_back(drive.arcs_m[i] + offset.dot(road.forward));
-  }
-  return arcs_m;
-}
-
 std::vector<double> calm(const std::vector<double>& arcs_m) {
   constexpr std::ptrdiff_t kReach = 7;
   std::vector<double> result;
@@ -63,8 +53,12 @@ struct Lead {
 
 class TrafficPlan {
  public:
-  TrafficPlan(const Drive& drive, std::uint64_t seed)
-      : road_(drive.road), seed_(seed), arcs_m_(exact_arcs(drive)) {
+  TrafficPlan(const Drive& drive, std::uint64_t seed) : road_(drive.road), seed_(seed) {
+    for (std::size_t i = 0; i < drive.arcs_m.size(); ++i) {
+      const RoadFrame road = road_.at(drive.arcs_m[i]);
+      const Vec3 offset = drive.world_from_camera[i].translation - road.position;
+      arcs_m_.push_back(drive.arcs_m[i] + offset.dot(road.forward));
+    }
     find_stands();
     arcs_m_ = calm(arcs_m_);
     plan_leads();
