@@ -305,17 +305,6 @@ void add_poles(const Street& street) {
   });
 }
 
-void add_parked_cars(const Street& street) {
-  street.for_each_slot(6.5, [&](int slot, double arc_m) {
-    Draw draw(street.seed, 'C', slot);
-    auto place = street.roomy(arc_m + draw.in(0.5, 1.4), 1.0, 0.95);
-    if (place && draw.chance(0.3)) {
-      place->position = place->point(3.35, 0.0);  // at the kerb on the right
-      add_car(*place, draw, false, street.scene, true);
-    }
-  });
-}
-
 /// Nothing stands in the way of the street the camera is in: the window ends where the road comes
 /// back to itself.
 cv::Range visible_window(const RoadCurve& road, double arc_m) {
@@ -340,7 +329,14 @@ void add_street(const RoadCurve& road,
   street.for_each_lot('H', kLot_m, std::bind_front(add_building, std::cref(street)));
   add_plants(street);
   add_poles(street);
-  add_parked_cars(street);
+  street.for_each_slot(6.5, [&](int slot, double slot_m) {
+    Draw draw(seed, 'C', slot);
+    auto place = street.roomy(slot_m + draw.in(0.5, 1.4), 1.0, 0.95);
+    if (place && draw.chance(0.3)) {
+      place->position = place->point(3.35, 0.0);  // parked at the kerb on the right
+      add_car(*place, draw, false, scene, true);
+    }
+  });
   for (int i = street.window.start; i < street.window.end; ++i) {
     if (std::ranges::find(crossings, street.home(i)) != crossings.end()) {
       add_side_streets(road.knot(i), hash_of(seed, 'Q', street.home(i)), scene);
