@@ -51,11 +51,8 @@ struct Stand {
 
 Style any_colour(Draw& draw) {
   const float light = draw.in_float(0.12, 0.75);
-  Style style;
-  for (float& value : style.albedo.val) {
-    value = light * draw.in_float(0.5, 1.2);
-  }
-  return style;
+  const auto tint = [&] { return draw.in_float(0.5, 1.2); };
+  return {.albedo = Rgb{tint(), tint(), tint()} * light};
 }
 
 Style brick_style(Draw& draw) {
@@ -329,8 +326,7 @@ void add_floor(
 
 Courtyard lay_courtyard(std::uint64_t seed) {
   Draw draw(seed, 'Y');
-  Courtyard yard;
-  yard.seed = seed;
+  Courtyard yard{.seed = seed};
   for (auto* lines : {&yard.x_m, &yard.z_m}) {
     *lines = {-draw.in(2.15, 2.4), 0.0, draw.in(2.15, 2.4)};
   }

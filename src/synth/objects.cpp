@@ -48,10 +48,8 @@ Part shadow(double length_m, double width_m) {
 
 Rgb any_paint(Draw& draw) {
   const float light = draw.in_float(0.25, 0.8);
-  const float red = draw.in_float(0.4, 1.1);
-  const float green = draw.in_float(0.4, 1.1);
-  const float blue = draw.in_float(0.4, 1.1);
-  return {light * red, light * green, light * blue};
+  const auto tint = [&] { return draw.in_float(0.4, 1.1); };
+  return Rgb{tint(), tint(), tint()} * light;
 }
 
 constexpr double kFoundation_m = 1.2;  // walls go into the ground, which may slope
