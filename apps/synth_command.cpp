@@ -10,7 +10,6 @@
 #include "console.hpp"
 #include "options.hpp"
 #include "synth/synth.hpp"
-#include "text/text_file.hpp"
 #include "try.hpp"
 
 namespace stemvo::apps {
@@ -66,24 +65,13 @@ void add_options(CLI::App& command, SynthArguments& arguments) {
       .add_flag("--walk", options.walk,
                 "Walk through a courtyard with the camera in the hand, in place of a drive")
       ->excludes(trajectory);
-  command.add_option("--name", options.name, "The sequence's name; default 00")
-      ->type_name("NAME")
-      ->check([](const std::string& text) {
-        const bool is_name =
-            !text.empty() && text != "." && text != ".." && text.find('/') == std::string::npos;
-        return is_name ? std::string() : "expected the name of a folder, found '" + text + "'";
-      });
+  command.add_option("--name", options.name, "The sequence's name; default 00")->type_name("NAME");
   command.add_option("--frames", options.num_frames, "Frames to render; default 100")
       ->type_name("N")
       ->check(in_range(1, 1000000));
   command.add_option("--seed", options.seed, "Seed of textures, shading and noise; default 1")
       ->type_name("S")
-      ->check([](const std::string& text) {
-        // CLI11 would wrap others around.
-        return parse_index(text)
-                   ? std::string()
-                   : "expected a whole number from 0 to 18446744073709551615, found " + text;
-      });
+      ->check(in_range(0.0, 0x1p64));  // CLI11 would wrap others around
   command
       .add_option("--visit", options.render.visit,
                   "The same place again, on another path and in other light (with the same "

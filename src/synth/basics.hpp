@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include <Eigen/Geometry>
+#include <opencv2/core.hpp>
 
 namespace stemvo::synth {
 
@@ -23,14 +24,10 @@ inline constexpr double kPi = std::numbers::pi;
       .toRotationMatrix();
 }
 
-using Rgb = std::array<float, 3>;  // 1 is white
+using Rgb = cv::Vec3f;  // 1 is white
 
-[[nodiscard]] constexpr Rgb scaled(const Rgb& colour, float factor) {
-  return {colour[0] * factor, colour[1] * factor, colour[2] * factor};
-}
-[[nodiscard]] constexpr Rgb blend(const Rgb& from, const Rgb& to, float share) {
-  return {from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]),
-          from[2] + share * (to[2] - from[2])};
+[[nodiscard]] inline Rgb blend(const Rgb& from, const Rgb& to, float share) {
+  return from + share * (to - from);
 }
 
 /// splitmix64's finaliser (Steele, Lea, Flood 2014): every bit of the result depends on every bit

@@ -51,11 +51,8 @@ struct Stand {
 
 Style any_colour(Draw& draw) {
   const float light = draw.in_float(0.12, 0.75);
-  Style style;
-  for (float& value : style.albedo) {
-    value = light * draw.in_float(0.5, 1.2);
-  }
-  return style;
+  const auto tint = [&] { return draw.in_float(0.5, 1.2); };
+  return {.albedo = Rgb{tint(), tint(), tint()} * light};
 }
 
 Style brick_style(Draw& draw) {
@@ -69,7 +66,7 @@ Style brick_style(Draw& draw) {
 Style board_style(Draw& draw) {
   return {.material = materials::boards,
           .seed = draw.bits(),
-          .albedo = scaled({0.42F, 0.32F, 0.21F}, draw.in_float(0.6, 1.3))};
+          .albedo = Rgb{0.42F, 0.32F, 0.21F} * draw.in_float(0.6, 1.3)};
 }
 
 Style hedge_style(Draw& draw) {
@@ -241,7 +238,7 @@ void add_wall_part(const Stand& stand, double width_m, std::size_t kind, Draw dr
   const auto& [min_height_m, max_height_m, own_style] = kWallKinds[kind];
   const double relief_m = draw.in(0.0, kMaxRelief_m);
   Style style{.material = materials::plain_wall, .seed = draw.bits()};
-  style.albedo = scaled({0.48F, 0.45F, 0.38F}, draw.in_float(0.85, 1.15));
+  style.albedo = Rgb{0.48F, 0.45F, 0.38F} * draw.in_float(0.85, 1.15);
   if (own_style != nullptr) {
     style = own_style(draw);
   }
@@ -306,19 +303,6 @@ void add_trees_behind(const Stand& stand, double length_m, Draw draw) {
   }
 }
 
-void add_things_between(const Courtyard& yard, Scene& scene) {
-  Draw draw(yard.seed, 'I');
-  const auto kinds = shuffled<kThings.size()>(draw);
-  for (std::size_t i = 0; i < kinds.size(); ++i) {
-    const std::size_t column = i % 2;
-    const std::size_t row = i / 2;
-    const Room room{yard.x_m[column + 1] - yard.x_m[column] - 2.0 * kWalkwayClear_m,
-                    yard.z_m[row + 1] - yard.z_m[row] - 2.0 * kWalkwayClear_m};
-    const Vec3 corner(yard.x_m[column] + kWalkwayClear_m, 0.0, yard.z_m[row] + kWalkwayClear_m);
-    kThings[kinds[i]]({scene, corner, Vec3::UnitX(), Vec3::UnitZ()}, room, Draw(draw.bits(), 'i'));
-  }
-}
-
 void add_floor(
     double left, double near, double right, double far, std::uint64_t seed, Scene& scene) {
   constexpr double kBorder_m = 1.1;
@@ -342,8 +326,7 @@ void add_floor(
 
 Courtyard lay_courtyard(std::uint64_t seed) {
   Draw draw(seed, 'Y');
-  Courtyard yard;
-  yard.seed = seed;
+  Courtyard yard{.seed = seed};
   for (auto* lines : {&yard.x_m, &yard.z_m}) {
     *lines = {-draw.in(2.15, 2.4), 0.0, draw.in(2.15, 2.4)};
   }
@@ -367,18 +350,22 @@ void add_courtyard(const Courtyard& courtyard, Scene& scene) {
                                        {scene, {left, 0.0, near}, z, x}}};
   for (std::size_t i = 0; i < sides.size(); ++i) {
     const double length_m = i % 2 == 0 ? right - left : far - near;
-    if (courtyard.has_blank_walls) {
-      add_blank_wall(sides[i], length_m, Draw(courtyard.seed, 'W', i));
-    } else {
-      add_wall(sides[i], length_m, Draw(courtyard.seed, 'W', i));
+    const auto& build_wall = courtyard.has_blank_walls ? add_blank_wall : add_wall;
+    build_wall(sides[i], length_m, Draw(courtyard.seed, 'W', i));
+    if (!courtyard.has_blank_walls || i % 2 == 1) {
+      add_things_at_wall(sides[i], length_m, Draw(courtyard.seed, 'X', i));
+      add_trees_behind(sides[i], length_m, Draw(courtyard.seed, 'Z', i));
     }
-    if (courtyard.has_blank_walls && i % 2 == 0) {
-      continue;
-    }
-    add_things_at_wall(sides[i], length_m, Draw(courtyard.seed, 'X', i));
-    add_trees_behind(sides[i], length_m, Draw(courtyard.seed, 'Z', i));
   }
-  add_things_between(courtyard, scene);
+  Draw draw(courtyard.seed, 'I');
+  const auto kinds = shuffled<kThings.size()>(draw);
+  for (std::size_t i = 0; i < kinds.size(); ++i) {  // between the walkways
+    const auto& [x0, x1] = std::pair(courtyard.x_m[i % 2], courtyard.x_m[i % 2 + 1]);
+    const auto& [z0, z1] = std::pair(courtyard.z_m[i / 2], courtyard.z_m[i / 2 + 1]);
+    const Room room{x1 - x0 - 2.0 * kWalkwayClear_m, z1 - z0 - 2.0 * kWalkwayClear_m};
+    const Vec3 corner(x0 + kWalkwayClear_m, 0.0, z0 + kWalkwayClear_m);
+    kThings[kinds[i]]({scene, corner, x, z}, room, Draw(draw.bits(), 'i'));
+  }
 }
 
 }  // namespace stemvo::synth

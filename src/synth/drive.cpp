@@ -3,27 +3,26 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <functional>
+#include <ranges>
+
+#include <opencv2/imgproc.hpp>
 
 namespace stemvo::synth {
 namespace {
 
 /// Smallest value within `reach` knots, then the mean over the same reach: smooth and never above
 /// the input, because every value in the mean already is a minimum over a window with this knot.
-std::vector<double> smooth_lower_bound(const std::vector<double>& values, std::ptrdiff_t reach) {
+std::vector<double> smooth_lower_bound(const std::vector<double>& values, int reach) {
+  const cv::Mat window = cv::Mat::ones(1, 2 * reach + 1, CV_64F);
   std::vector<double> lowest;
-  std::vector<double> result;
-  const auto n = std::ssize(values);
-  for (std::ptrdiff_t i = 0; i < n; ++i) {
-    lowest.push_back(*std::min_element(values.begin() + std::max(i - reach, 0L),
-                                       values.begin() + std::min(i + reach + 1, n)));
-  }
-  for (std::ptrdiff_t i = 0; i < n; ++i) {
-    const auto begin = lowest.begin() + std::max(i - reach, 0L);
-    const auto end = lowest.begin() + std::min(i + reach + 1, n);
-    result.push_back(std::accumulate(begin, end, 0.0) / static_cast<double>(end - begin));
-  }
-  return result;
+  std::vector<double> sum;
+  std::vector<double> count(values.size(), 1.0);  // fewer at the ends
+  cv::erode(values, lowest, window);
+  cv::filter2D(lowest, sum, -1, window, {-1, -1}, 0.0, cv::BORDER_CONSTANT);
+  cv::filter2D(count, count, -1, window, {-1, -1}, 0.0, cv::BORDER_CONSTANT);
+  std::ranges::transform(sum, count, sum.begin(), std::divides());
+  return sum;
 }
 
 /// In a bend of radius R the inner edge of the street must stay well inside R or the ribbon folds
@@ -47,20 +46,12 @@ void squeeze_in_turns(std::vector<RoadFrame>& knots) {
   }
 }
 
-constexpr double kMaxSpeed_m_s = 12.0;
-
 /// Twice over: smooth, with smooth derivatives.
 std::vector<double> smooth(std::vector<double> values, int reach) {
-  const int n = static_cast<int>(values.size());
+  const cv::Mat window = cv::Mat::ones(1, 2 * reach + 1, CV_64F);
   for (int pass = 0; pass < 2; ++pass) {
-    const std::vector<double> from = values;
-    for (int i = 0; i < n; ++i) {
-      double sum = 0.0;
-      for (int k = -reach; k <= reach; ++k) {
-        sum += from[static_cast<std::size_t>(std::clamp(i + k, 0, n - 1))];
-      }
-      values[static_cast<std::size_t>(i)] = sum / (2 * reach + 1);
-    }
+    cv::filter2D(values, values, -1, window, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
+    cv::divide(values, static_cast<double>(window.cols), values);
   }
   return values;
 }
@@ -110,18 +101,6 @@ RoadCurve lay_road(const std::vector<double>& curvature, std::uint64_t seed) {
   return RoadCurve(path);
 }
 
-/// Metres per second at each knot: slower in turns, changing gently.
-std::vector<double> plan_speed(const std::vector<double>& curvature) {
-  constexpr double kMinSpeed_m_s = 8.0;
-  constexpr double kComfortable_m_s2 = 3.0;
-  std::vector<double> speed;
-  for (const double bend : curvature) {
-    const double limit = std::sqrt(kComfortable_m_s2 / std::max(std::abs(bend), 1e-6));
-    speed.push_back(std::clamp(limit, kMinSpeed_m_s, kMaxSpeed_m_s));
-  }
-  return smooth(speed, 10);
-}
-
 class Driver {
  public:
   Driver(const std::vector<double>& curvature, std::uint64_t seed)
@@ -148,21 +127,16 @@ class Driver {
  private:
   /// At the straightest place of the 90 m from `begin_m` on.
   void plan_stop(double begin_m) {
-    constexpr int kAhead = 23;  // knots: a crossing begins there
+    constexpr std::size_t kAhead = 23;  // knots: a crossing begins there
     stand_s_ = draw_.in(4.0, 7.0);
-    double least = 1e9;
-    for (int offset = 0; offset < 90; ++offset) {
-      const int stop = static_cast<int>(begin_m) + offset;
+    const auto stops = std::views::iota(static_cast<std::size_t>(begin_m)) | std::views::take(90);
+    stop_m_ = static_cast<double>(*std::ranges::min_element(stops, {}, [&](std::size_t stop) {
       double most = 0.0;
-      for (int k = stop; k <= stop + kAhead; ++k) {
-        const auto knot = std::min(static_cast<std::size_t>(k), curvature_.size() - 1);
-        most = std::max(most, std::abs(curvature_[knot]));
+      for (std::size_t k = stop; k <= stop + kAhead; ++k) {
+        most = std::max(most, std::abs(curvature_[std::min(k, curvature_.size() - 1)]));
       }
-      if (most < least) {
-        least = most;
-        stop_m_ = stop;
-      }
-    }
+      return most;
+    }));
   }
 
   const std::vector<double>& curvature_;
@@ -274,10 +248,18 @@ Rigid3 pose_at(const Trajectory& poses, double frame) {
 
 Drive make_own_drive(int num_frames, std::uint64_t seed, bool stops) {
   constexpr double kInterval_s = 1.0 / kDriveRate_hz;
+  constexpr double kMinSpeed_m_s = 8.0;
+  constexpr double kMaxSpeed_m_s = 12.0;
+  constexpr double kComfortable_m_s2 = 3.0;
   const double longest_m = kMaxSpeed_m_s * kInterval_s * num_frames;
   const auto num_knots = static_cast<std::size_t>(kRoadBehind_m + longest_m + kRoadAhead_m);
   const auto curvature = draw_curvature(num_knots, seed);
-  const auto speed = plan_speed(curvature);
+  std::vector<double> speed;  // m/s at each knot: slower in turns, changing gently
+  for (const double bend : curvature) {
+    const double limit = std::sqrt(kComfortable_m_s2 / std::max(std::abs(bend), 1e-6));
+    speed.push_back(std::clamp(limit, kMinSpeed_m_s, kMaxSpeed_m_s));
+  }
+  speed = smooth(speed, 10);
   Drive drive{lay_road(curvature, seed), {}, {}};
   const CarBody body{seed};
   double arc_m = kRoadBehind_m;
@@ -313,19 +295,6 @@ void drive_again(std::uint64_t seed, int visit, Drive& drive) {
     drive.world_from_camera[i] = detour.moved(pose, way_m);
     drive.arcs_m[i] = first_arcs_m[std::min(static_cast<std::size_t>(at), first.size() - 1)];
   }
-}
-
-Daylight daylight(std::uint64_t seed, int visit) {
-  Draw draw = visit == 0 ? Draw(seed, 'L') : Draw(seed, 'L', visit);
-  const double azimuth = draw.in(0.0, 2.0 * kPi);
-  const double height = draw.in(0.6, 0.8);  // rad
-  Daylight light{{std::cos(height) * std::sin(azimuth), -std::sin(height),
-                  std::cos(height) * std::cos(azimuth)}};
-  if (visit != 0) {
-    light.ambient_factor = draw.in(0.8, 1.25);
-    light.gain = draw.in_float(0.75, 1.25);
-  }
-  return light;
 }
 
 }  // namespace stemvo::synth

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -67,6 +68,9 @@ class RoadCurve {
     return knots_[static_cast<std::size_t>(index)];
   }
   [[nodiscard]] const std::vector<RoadPart>& parts() const { return parts_; }
+  [[nodiscard]] const RoadPart& part_of(int knot) const {
+    return *std::ranges::upper_bound(parts_, knot, {}, &RoadPart::end);
+  }
   /// Between the knots: position by cubic Hermite, so that a camera on it moves smoothly.
   [[nodiscard]] RoadFrame at(double arc_m) const;
 
@@ -134,15 +138,5 @@ struct Walk {
 /// The same street driven again: up to 0.9 m further left or 0.6 m further right, with other sway,
 /// at 0.9 to 1 times the speed, from between the first two frames on.
 void drive_again(std::uint64_t seed, int visit, Drive& drive);
-
-/// Light of a place at one time.
-struct Daylight {
-  Vec3 to_sun;
-  double ambient_factor = 1.0;
-  float gain = 1.0F;  ///< of the camera
-};
-
-/// Visit 0 is the first one.
-[[nodiscard]] Daylight daylight(std::uint64_t seed, int visit);
 
 }  // namespace stemvo::synth

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <iterator>
+#include <map>
 #include <optional>
+#include <ranges>
 
 #include "synth/drive.hpp"
 
@@ -106,49 +108,38 @@ std::vector<double> arcs_along(const RoadCurve& road, const Trajectory& world_fr
   std::vector<double> arcs_m;
   int last = static_cast<int>(kRoadBehind_m + kStraightOn_m);
   for (const Rigid3& pose : world_from_camera) {
-    const auto distance2 = [&](int i) {
-      return (road.knot(i).position - pose.translation).squaredNorm();
-    };
-    int best = last;
-    const int end = std::min(last + kReach + 1, road.num_knots());
-    for (int i = std::max(last - kReach, 0); i < end; ++i) {
-      best = distance2(i) < distance2(best) ? i : best;
-    }
-    last = best;
-    arcs_m.push_back(best);
+    const auto near =
+        std::views::iota(std::max(last - kReach, 0), std::min(last + kReach + 1, road.num_knots()));
+    last = *std::ranges::min_element(
+        near, {}, [&](int i) { return (road.knot(i).position - pose.translation).squaredNorm(); });
+    arcs_m.push_back(last);
   }
   return arcs_m;
 }
 
-void lift(const std::vector<double>& lifts_m, Drive& drive) {
-  const std::vector<double> arcs_m = arcs_along(drive.road, drive.world_from_camera);
-  for (std::size_t i = 0; i < arcs_m.size(); ++i) {
-    drive.world_from_camera[i].translation.y() -= lifts_m[static_cast<std::size_t>(arcs_m[i])];
-  }
-}
+/// Per knot of a road on which it comes back to an earlier part, in the same direction: the knot
+/// there. Earlier parts are new places themselves.
+using Homes = std::map<int, int>;
 
-constexpr int kNewPlace = -1;
 constexpr int kBlend = 12;  ///< knots on which a road joins its earlier part, or leaves it
 
 /// The earlier knot nearest to knot `at` on a new place, of those that are level with it.
-int nearest_home(const RoadCurve& road, int at, const std::vector<int>& homes) {
+std::optional<int> nearest_home(const RoadCurve& road, int at, const Homes& homes) {
   constexpr int kApart = 100;  // knots: nearer ones are the same visit
   constexpr double kSameStreet_m = 5.0;
   constexpr double kLevel_m = 6.0;  // a bridge is higher; measured heights drift by 4 m
   const double min_cosine = std::cos(radians(30.0));
   const RoadFrame& here = road.knot(at);
   double nearest_m = kSameStreet_m;
-  int home = kNewPlace;
-  for (int j = 0; j <= at - kApart;) {
+  std::optional<int> home;
+  for (int j = 0; j <= at - kApart; ++j) {
     const Vec3 offset = road.knot(j).position - here.position;
     const double distance_m = std::hypot(offset.x(), offset.z());
-    if (homes[static_cast<std::size_t>(j)] == kNewPlace && distance_m < nearest_m &&
-        std::abs(offset.y()) < kLevel_m && road.knot(j).forward.dot(here.forward) > min_cosine) {
+    if (distance_m < nearest_m && std::abs(offset.y()) < kLevel_m &&
+        road.knot(j).forward.dot(here.forward) > min_cosine && !homes.contains(j)) {
       nearest_m = distance_m;
       home = j;
     }
-    // Knots are 1 m apart, so those between are too far away.
-    j += std::max(1, static_cast<int>(distance_m - kSameStreet_m));
   }
   return home;
 }
@@ -160,24 +151,19 @@ Vec3 on_line(const RoadFrame& home, const Vec3& point) {
 
 class Joiner {
  public:
-  Joiner(const RoadCurve& road, const std::vector<int>& homes)
-      : road_(road), homes_(homes), joined_(homes.size(), kNewPlace) {}
+  Joiner(const RoadCurve& road, const Homes& homes) : road_(road), homes_(homes) {}
 
   RoadCurve join() {
-    const int end = road_.num_knots();
-    for (int i = 0; i < end;) {
-      if (homes_[static_cast<std::size_t>(i)] == kNewPlace) {
-        joined_[static_cast<std::size_t>(i)] = static_cast<int>(path_.points.size());
-        path_.add(road_.knot(i).position, road_.knot(i).up);
+    for (int i = 0; i < road_.num_knots(); ++i) {
+      const int begin = i;
+      while (homes_.contains(i)) {
         ++i;
-        continue;
       }
-      int run_end = i;
-      while (run_end < end && homes_[static_cast<std::size_t>(run_end)] != kNewPlace) {
-        ++run_end;
+      if (i > begin) {
+        add_visit(begin, i);
       }
-      add_visit(i, run_end);
-      i = run_end;
+      joined_[i] = static_cast<int>(path_.points.size());
+      path_.add(road_.knot(i).position, road_.knot(i).up);
     }
     close_part(0);
     return RoadCurve(path_, parts_);
@@ -187,20 +173,16 @@ class Joiner {
   /// The knots since the last part are a part that is `shift` knots behind its first visit.
   void close_part(int shift) {
     const int begin = parts_.empty() ? 0 : parts_.back().end;
-    const int end = static_cast<int>(path_.points.size());
-    if (end > begin) {
-      parts_.push_back({begin, end, shift});
-    }
+    parts_.push_back({begin, static_cast<int>(path_.points.size()), shift});
   }
 
   /// Own knots [begin, end) are on an earlier part.
   void add_visit(int begin, int end) {
-    const int first = homes_[static_cast<std::size_t>(begin + kBlend)];
-    const int last = homes_[static_cast<std::size_t>(end - 1 - kBlend)];
+    const int first = homes_.at(begin + kBlend);
+    const int last = homes_.at(end - 1 - kBlend);
     add_blend(begin, begin + kBlend, true);
     close_part(0);
-    const int shift =
-        static_cast<int>(path_.points.size()) - joined_[static_cast<std::size_t>(first)];
+    const int shift = static_cast<int>(path_.points.size()) - joined_.at(first);
     for (int home = first; home <= last; ++home) {
       path_.add(road_.knot(home).position, road_.knot(home).up);
     }
@@ -212,7 +194,7 @@ class Joiner {
   /// laid anew between the knots before and behind them, evenly and about 1 m apart.
   void add_blend(int begin, int end, bool is_joining) {
     const auto knot_at = [&](int own, bool is_home) -> const RoadFrame& {
-      return road_.knot(is_home ? homes_[static_cast<std::size_t>(own)] : own);
+      return road_.knot(is_home ? homes_.at(own) : own);
     };
     const RoadFrame& from = knot_at(begin - 1, !is_joining);
     Path line{{from.position}, {from.up}};
@@ -239,79 +221,60 @@ class Joiner {
   }
 
   const RoadCurve& road_;
-  const std::vector<int>& homes_;
-  std::vector<int> joined_;  ///< per own knot on a new place: its number on the joined road
+  const Homes& homes_;
+  std::map<int, int> joined_;  ///< per own knot on a new place: its number on the joined road
   Path path_;
   std::vector<RoadPart> parts_;
 };
 
-/// Per knot of a road: the knot of an earlier part of the road on which it comes back, in the same
-/// direction; or kNewPlace. Earlier parts are new places themselves.
-std::vector<int> find_revisits(const RoadCurve& road) {
+Homes find_revisits(const RoadCurve& road) {
   constexpr int kShortest = 2 * kBlend + 20;  // knots
   constexpr int kMaxStep = 4;                 // of the earlier knots, between neighbours
-  std::vector<int> homes(static_cast<std::size_t>(road.num_knots()), kNewPlace);
-  const auto home = [&](int i) -> int& { return homes[static_cast<std::size_t>(i)]; };
-  int begin = 0;  // of the present visit
-  for (int i = 0; i <= road.num_knots(); ++i) {
-    int found = kNewPlace;
-    // The road's ends stay what they are: knots before and behind a visit are needed.
-    if (i > 0 && i + 1 < road.num_knots()) {
-      found = nearest_home(road, i, homes);
-    }
-    if (found != kNewPlace && i > begin) {
-      const int step = found - home(i - 1);
-      found = step >= 0 && step <= kMaxStep ? found : kNewPlace;
-    }
-    if (found != kNewPlace) {
-      home(i) = found;
+  Homes homes;
+  int begin = 1;  // of the present visit
+  // The road's ends stay what they are: knots before and behind a visit are needed.
+  for (int i = begin; i < road.num_knots(); ++i) {
+    const auto found = i + 1 < road.num_knots() ? nearest_home(road, i, homes) : std::nullopt;
+    const int step = found && i > begin ? *found - homes.at(i - 1) : 0;
+    if (found && step >= 0 && step <= kMaxStep) {
+      homes[i] = *found;
       continue;
     }
     if (i - begin < kShortest) {
-      std::fill(homes.begin() + begin, homes.begin() + std::min(i, road.num_knots()), kNewPlace);
+      homes.erase(homes.lower_bound(begin), homes.end());
     }
     begin = i + 1;
   }
   return homes;
 }
 
-/// Metres per knot, upwards, that bring each street's second visit to the height of its first.
-/// Between visits they change evenly along the road.
-std::vector<double> lifts_to_first_visit(const RoadCurve& road, const std::vector<int>& homes) {
-  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-  std::vector<double> lifts(homes.size(), kUnknown);
-  for (std::size_t i = 0; i < homes.size(); ++i) {
-    if (homes[i] != kNewPlace) {
-      const RoadFrame& first = road.knot(homes[i]);
-      const Vec3 offset = first.position - road.knot(static_cast<int>(i)).position;
-      lifts[i] = first.up.dot(offset) / -first.up.y();
-      lifts[static_cast<std::size_t>(homes[i])] = 0.0;
-    }
+/// Brings each street's second visit to the height of its first. Between visits the lift changes
+/// evenly along the road.
+void lift_to_first_visit(const Homes& homes, Drive& drive) {
+  std::map<int, double> lifts_m;  // of knots, upwards
+  for (const auto& [knot, home] : homes) {
+    const RoadFrame& first = drive.road.knot(home);
+    const Vec3 offset = first.position - drive.road.knot(knot).position;
+    lifts_m[knot] = first.up.dot(offset) / -first.up.y();
+    lifts_m[home] = 0.0;
   }
-  std::optional<std::size_t> last;  // with a known lift
-  for (std::size_t i = 0; i < lifts.size(); ++i) {
-    if (std::isnan(lifts[i])) {
-      continue;
-    }
-    for (std::size_t k = last ? *last + 1 : 0; k < i; ++k) {
-      const double t = last ? static_cast<double>(k - *last) / static_cast<double>(i - *last) : 1.0;
-      const double from = last ? lifts[*last] : lifts[i];
-      lifts[k] = from + t * (lifts[i] - from);
-    }
-    last = i;
+  const std::vector<double> arcs_m = arcs_along(drive.road, drive.world_from_camera);
+  for (std::size_t i = 0; i < arcs_m.size(); ++i) {
+    const auto next = lifts_m.upper_bound(static_cast<int>(arcs_m[i]));
+    const auto& [end, end_m] = *(next == lifts_m.end() ? std::prev(next) : next);
+    const auto& [begin, begin_m] = *(next == lifts_m.begin() ? next : std::prev(next));
+    const double t = begin < end ? (arcs_m[i] - begin) / (end - begin) : 0.0;
+    drive.world_from_camera[i].translation.y() -= begin_m + t * (end_m - begin_m);
   }
-  std::fill(lifts.begin() + (last ? static_cast<std::ptrdiff_t>(*last) : 0), lifts.end(),
-            last ? lifts[*last] : 0.0);
-  return lifts;
 }
 
 }  // namespace
 
 Drive make_drive_along(const Trajectory& world_from_camera) {
   Drive drive{fit_road(choose_keys(world_from_camera)), world_from_camera, {}};
-  std::vector<int> homes = find_revisits(drive.road);
-  if (std::ranges::any_of(homes, [](int home) { return home != kNewPlace; })) {
-    lift(lifts_to_first_visit(drive.road, homes), drive);
+  const Homes homes = find_revisits(drive.road);
+  if (!homes.empty()) {
+    lift_to_first_visit(homes, drive);
     const RoadCurve level = fit_road(choose_keys(drive.world_from_camera));
     drive.road = Joiner(level, find_revisits(level)).join();
   }

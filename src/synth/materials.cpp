@@ -48,9 +48,9 @@ Rgb paving(const Sample& at, float length, float breadth) {
   const int period = static_cast<int>(std::lround(static_cast<float>(kTexturePeriod_m) / length));
   const int column = (stone.column % period + period) % period;
   const auto own = static_cast<float>(unit(hash_of(at.style.seed, stone.row, column)) - 0.5);
-  return scaled(at.style.albedo, 1.0F + 0.12F * sharpness(stone.footprint_share) * own +
-                                     0.08F * at.grain(0.01F, 3.0F) + 0.07F * at.grain(0.06F, 1.0F) -
-                                     0.3F * stone.joints);
+  return at.style.albedo *
+         (1.0F + 0.12F * sharpness(stone.footprint_share) * own + 0.08F * at.grain(0.01F, 3.0F) +
+          0.07F * at.grain(0.06F, 1.0F) - 0.3F * stone.joints);
 }
 
 Rgb foliage(const Sample& at, float texel_m, float contrast) {
@@ -58,7 +58,7 @@ Rgb foliage(const Sample& at, float texel_m, float contrast) {
   const float coarse = at.leaf(4.0F * texel_m, shift);
   const float tone =
       std::max(0.08F, 1.0F + contrast * (0.8F * at.leaf(texel_m, shift) + 0.5F * coarse));
-  Rgb colour = scaled(at.style.albedo, tone);
+  Rgb colour = at.style.albedo * tone;
   colour[0] += 0.04F * std::max(0.0F, coarse) * at.style.albedo[1];  // sunlit: yellower
   return colour;
 }
@@ -132,7 +132,7 @@ Rgb asphalt(const Sample& at) {
   // Worn white dashes in the middle of the road.
   const float dashes =
       box_coverage(at.v, at.width_v, -1.82F, -1.71F) * at.bars_u(kDashPeriod_m, 3.3F);
-  return blend(scaled(at.style.albedo, tone), {0.62F, 0.62F, 0.60F},
+  return blend(at.style.albedo * tone, {0.62F, 0.62F, 0.60F},
                dashes * std::clamp(0.75F + 0.2F * grain, 0.0F, 1.0F));
 }
 
@@ -145,20 +145,19 @@ Rgb bark(const Sample& at) { return foliage(at, 0.01F, 0.3F); }
 Rgb leaves(const Sample& at) { return foliage(at, 0.02F, 0.75F); }
 
 Rgb kerb(const Sample& at) {
-  return scaled(at.style.albedo, 1.0F + 0.12F * at.grain(0.01F, 5.0F) +
-                                     0.08F * at.grain(0.06F, 2.0F) -
-                                     0.4F * at.bars_u(0.96F, 0.015F));
+  return at.style.albedo * (1.0F + 0.12F * at.grain(0.01F, 5.0F) + 0.08F * at.grain(0.06F, 2.0F) -
+                            0.4F * at.bars_u(0.96F, 0.015F));
 }
 
 Rgb roof(const Sample& at) {
   const auto shift = static_cast<float>(at.style.seed % 97U);
-  return scaled(at.style.albedo,
-                1.0F - 0.3F * at.bars_v(0.33F, 0.06F) - 0.18F * at.bars_u(0.25F, 0.05F) +
-                    0.12F * at.grain(0.03F, shift) + 0.08F * at.grain(0.25F, shift));
+  return at.style.albedo *
+         (1.0F - 0.3F * at.bars_v(0.33F, 0.06F) - 0.18F * at.bars_u(0.25F, 0.05F) +
+          0.12F * at.grain(0.03F, shift) + 0.08F * at.grain(0.25F, shift));
 }
 
 Rgb fence(const Sample& at) {
-  return scaled(at.style.albedo, 1.0F - 0.6F * at.bars_u(0.16F, 0.03F) + 0.15F * at.grain(0.02F));
+  return at.style.albedo * (1.0F - 0.6F * at.bars_u(0.16F, 0.03F) + 0.15F * at.grain(0.02F));
 }
 
 /// For walls that are seen from a step away: grains of 3 mm, and stains.
@@ -171,7 +170,7 @@ Rgb brick(const Sample& at) {
   const float stains = 0.06F * at.grain(0.03F, shift) + 0.10F * at.leaf(0.04F, shift);
   const float tone = 1.0F + 0.55F * own + 0.10F * at.grain(0.003F, shift) + stains;
   const float gray = 0.46F * (1.0F + 0.06F * at.grain(0.004F, shift) + stains);
-  return blend(scaled(at.style.albedo, tone), {gray, 0.97F * gray, 0.92F * gray}, stone.joints);
+  return blend(at.style.albedo * tone, {gray, 0.97F * gray, 0.92F * gray}, stone.joints);
 }
 
 /// Planks with streaks along them and gaps between them.
@@ -186,15 +185,14 @@ Rgb boards(const Sample& at) {
   const auto shift = static_cast<float>(at.style.seed % 53U);
   const float tone = 1.0F + 0.5F * own + 0.16F * along.grain(0.004F, shift) +
                      0.12F * along.leaf(0.01F, shift) + 0.06F * at.grain(0.02F, shift);
-  return scaled(at.style.albedo,
-                std::max(0.1F, tone) * (1.0F - 0.75F * at.bars_u(kWidth_m, 0.008F)));
+  return at.style.albedo * (std::max(0.1F, tone) * (1.0F - 0.75F * at.bars_u(kWidth_m, 0.008F)));
 }
 
 Rgb bodywork(const Sample& at) {
   const auto shift = static_cast<float>(at.style.seed % 43U);
   const float dirt = 0.10F * at.grain(0.012F, shift) + 0.12F * at.leaf(0.03F, shift);
-  return scaled(at.style.albedo,
-                1.0F + dirt - 0.7F * at.bars_u(1.05F, 0.02F) - 0.5F * at.bars_v(0.26F, 0.015F));
+  return at.style.albedo *
+         (1.0F + dirt - 0.7F * at.bars_u(1.05F, 0.02F) - 0.5F * at.bars_v(0.26F, 0.015F));
 }
 
 Rgb printed_sheet(const Sample& at) {
@@ -209,7 +207,7 @@ Rgb printed_sheet(const Sample& at) {
   Draw field = cell(kField_m, 'f');
   const float tone = field.in_float(0.45, 1.35);
   Rgb colour = at.style.albedo;
-  for (float& value : colour) {
+  for (float& value : colour.val) {
     value *= 1.0F + sharp(kField_m) * (tone * field.in_float(0.75, 1.2) - 1.0F);
   }
   // Every second field has lines of letters.
@@ -217,17 +215,17 @@ Rgb printed_sheet(const Sample& at) {
     Draw letter = cell(kLetter_m, 'l');
     const float ink = letter.chance(0.6) ? -0.75F : 0.15F;
     const float gaps = std::max(at.bars_v(kLetter_m, 0.03F), at.bars_u(kLetter_m, 0.02F));
-    colour = scaled(colour, 1.0F + sharp(kLetter_m) * ink * (1.0F - gaps));
+    colour = colour * (1.0F + sharp(kLetter_m) * ink * (1.0F - gaps));
   }
   const auto shift = static_cast<float>(at.style.seed % 37U);
-  return scaled(colour, 1.0F + 0.07F * at.grain(0.012F, shift) + 0.06F * at.leaf(0.04F, shift));
+  return colour * (1.0F + 0.07F * at.grain(0.012F, shift) + 0.06F * at.leaf(0.04F, shift));
 }
 
 Rgb cloth(const Sample& at) {
   const auto shift = static_cast<float>(at.style.seed % 47U);
   const float stripes = (at.style.seed & 4U) != 0U ? 0.35F * at.bars_v(0.12F, 0.05F) : 0.0F;
-  return scaled(at.style.albedo, std::max(0.1F, 1.0F + 0.15F * at.grain(0.006F, shift) +
-                                                    0.25F * at.leaf(0.012F, shift) - stripes));
+  return at.style.albedo * (std::max(0.1F, 1.0F + 0.15F * at.grain(0.006F, shift) +
+                                               0.25F * at.leaf(0.012F, shift) - stripes));
 }
 
 Rgb plain_wall(const Sample& at) {
@@ -235,7 +233,7 @@ Rgb plain_wall(const Sample& at) {
   const float tone = 1.0F + 0.05F * at.grain(0.015F, shift) + 0.06F * at.grain(0.06F, shift);
   const float plinth = box_coverage(at.v, at.width_v, -10.0F, kPlinth_m);
   const float dirt = 0.12F * std::clamp(1.5F - 0.8F * at.v, 0.0F, 1.0F);
-  return scaled(at.style.albedo, tone * (1.0F - dirt) * (1.0F - 0.35F * plinth));
+  return at.style.albedo * (tone * (1.0F - dirt) * (1.0F - 0.35F * plinth));
 }
 
 Rgb facade(const Sample& at) {

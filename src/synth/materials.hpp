@@ -34,10 +34,6 @@ class Ripmap {
   std::array<std::array<cv::Mat, kLevels>, kLevels> levels_;  // [v][u]
 };
 
-/// Sum of value noise over octaves: `amplitudes[k]` at a wavelength of 2^k texels.
-[[nodiscard]] std::vector<float> octave_noise(std::uint64_t seed,
-                                              const std::vector<double>& amplitudes);
-
 /// Every material and the sky are painted from these.
 struct Textures {
   explicit Textures(std::uint64_t seed);
@@ -92,7 +88,7 @@ struct Sample {
 };
 
 /// Colour of the air.
-inline constexpr Rgb kHaze = {0.60F, 0.63F, 0.66F};
+inline const Rgb kHaze = {0.60F, 0.63F, 0.66F};
 
 /// The backdrop: blue with thin clouds, wooded hills on the horizon, fields below it. It is
 /// infinitely far and moves with the camera's rotation only. `direction` in world axes (-y up), any

@@ -15,29 +15,30 @@ struct Part {
   Vec3 corner;
   Vec3 size;
   Material material = nullptr;
+  double lean_m = 0.0;  ///< its top is so far behind its foot
 };
 
-constexpr Rgb kTyre = {0.03F, 0.03F, 0.03F};
-constexpr Rgb kTailLamp = {0.6F, 0.12F, 0.1F};
-constexpr Rgb kHeadLamp = {0.8F, 0.8F, 0.76F};
-constexpr Rgb kGlass = {0.07F, 0.08F, 0.09F};
-constexpr Rgb kPlate = {0.85F, 0.85F, 0.82F};
-constexpr Rgb kShadow = {0.07F, 0.07F, 0.075F};  // what the sky cannot reach
+const Rgb kTyre = {0.03F, 0.03F, 0.03F};
+const Rgb kTailLamp = {0.6F, 0.12F, 0.1F};
+const Rgb kHeadLamp = {0.8F, 0.8F, 0.76F};
+const Rgb kGlass = {0.07F, 0.08F, 0.09F};
+const Rgb kPlate = {0.85F, 0.85F, 0.82F};
+const Rgb kShadow = {0.07F, 0.07F, 0.075F};  // what the sky cannot reach
 
-void add_parts(const RoadFrame& axes,
-               const Vec3& origin,
+void add_parts(const RoadFrame& at,
                std::span<const Part> parts,
                const Style& common,
                Scene& scene) {
   Style style = common;
   for (const Part& part : parts) {
-    const Vec3 at = origin + part.corner.x() * axes.forward + part.corner.y() * axes.right +
-                    part.corner.z() * axes.up;
+    const Vec3 corner = at.position + part.corner.x() * at.forward + part.corner.y() * at.right +
+                        part.corner.z() * at.up;
     style.albedo = part.albedo;
     style.material = part.material;
-    scene.add_box(
-        at, {part.size.x() * axes.forward, part.size.y() * axes.right, part.size.z() * axes.up},
-        style);
+    scene.add_box(corner,
+                  {part.size.x() * at.forward, part.size.y() * at.right,
+                   part.size.z() * at.up - part.lean_m * at.forward},
+                  style);
   }
 }
 
@@ -45,41 +46,10 @@ Part shadow(double length_m, double width_m) {
   return {kShadow, {-0.1, -0.1 - 0.5 * width_m, 0.0}, {length_m + 0.2, width_m + 0.2, 0.015}};
 }
 
-/// `body`: nullptr: plain, seen from behind; else with a face in front, too.
-void add_any_car(
-    const RoadFrame& axes, const Vec3& origin, Draw draw, Material body, bool moves, Scene& scene) {
-  const float gray = draw.in_float(0.05, 0.75);
-  const float tint = draw.in_float(-0.12, 0.12);
-  const Rgb paint = {gray + std::max(tint, 0.0F), gray, gray + std::max(-tint, 0.0F)};
-  const std::uint32_t seed = draw.bits();
-  const double width = draw.in(1.65, 1.8);
-  const double length = draw.in(3.9, 4.7);
-  const auto across = [&](double right_of_left_side) { return right_of_left_side - 0.5 * width; };
-  std::vector<Part> parts = {
-      {paint, {0.0, across(0.0), 0.3}, {length, width, 0.52}, body},
-      {kGlass, {0.12 * length, across(0.09), 0.82}, {0.55 * length, width - 0.18, 0.5}},
-      {paint, {0.2 * length, across(0.12), 1.32}, {0.38 * length, width - 0.24, 0.1}, body},
-      {kTyre, {0.12 * length, across(-0.02), 0.0}, {0.6, width + 0.04, 0.58}},
-      {kTyre, {0.72 * length, across(-0.02), 0.0}, {0.6, width + 0.04, 0.58}},
-      {kTailLamp, {-0.02, across(0.05), 0.62}, {0.02, 0.3, 0.14}},
-      {kTailLamp, {-0.02, across(width - 0.35), 0.62}, {0.02, 0.3, 0.14}},
-      {kPlate, {-0.02, across(0.5 * width - 0.26), 0.5}, {0.02, 0.52, 0.11}},
-      shadow(length, width)};
-  if (body != nullptr) {
-    const double side = 0.5 * width;
-    parts.insert(parts.end(), {{kHeadLamp, {length, 0.05 - side, 0.58}, {0.02, 0.36, 0.16}},
-                               {kHeadLamp, {length, side - 0.41, 0.58}, {0.02, 0.36, 0.16}},
-                               {kTyre, {length, 0.45 - side, 0.45}, {0.015, width - 0.9, 0.2}}});
-  }
-  add_parts(axes, origin, parts, {.seed = seed, .moves = moves}, scene);
-}
-
 Rgb any_paint(Draw& draw) {
   const float light = draw.in_float(0.25, 0.8);
-  const float red = draw.in_float(0.4, 1.1);
-  const float green = draw.in_float(0.4, 1.1);
-  const float blue = draw.in_float(0.4, 1.1);
-  return {light * red, light * green, light * blue};
+  const auto tint = [&] { return draw.in_float(0.4, 1.1); };
+  return Rgb{tint(), tint(), tint()} * light;
 }
 
 constexpr double kFoundation_m = 1.2;  // walls go into the ground, which may slope
@@ -103,13 +73,32 @@ void add_lights(const RoadFrame& middle, Scene& scene) {
 
 }  // namespace
 
-void add_parked_car(const RoadFrame& place, Draw draw, Scene& scene) {
-  constexpr double kLateral_m = 3.35;
-  add_any_car(place, place.point(kLateral_m, 0.0), draw, nullptr, false, scene);
-}
-
-void add_car(const RoadFrame& at, Draw draw, bool moves, Scene& scene) {
-  add_any_car(at, at.position, draw, materials::bodywork, moves, scene);
+void add_car(const RoadFrame& at, Draw draw, bool moves, Scene& scene, bool is_parked) {
+  const Material body = is_parked ? nullptr : materials::bodywork;
+  const float gray = draw.in_float(0.05, 0.75);
+  const float tint = draw.in_float(-0.12, 0.12);
+  const Rgb paint = {gray + std::max(tint, 0.0F), gray, gray + std::max(-tint, 0.0F)};
+  const std::uint32_t seed = draw.bits();
+  const double width = draw.in(1.65, 1.8);
+  const double length = draw.in(3.9, 4.7);
+  const auto across = [&](double right_of_left_side) { return right_of_left_side - 0.5 * width; };
+  std::vector<Part> parts = {
+      {paint, {0.0, across(0.0), 0.3}, {length, width, 0.52}, body},
+      {kGlass, {0.12 * length, across(0.09), 0.82}, {0.55 * length, width - 0.18, 0.5}},
+      {paint, {0.2 * length, across(0.12), 1.32}, {0.38 * length, width - 0.24, 0.1}, body},
+      {kTyre, {0.12 * length, across(-0.02), 0.0}, {0.6, width + 0.04, 0.58}},
+      {kTyre, {0.72 * length, across(-0.02), 0.0}, {0.6, width + 0.04, 0.58}},
+      {kTailLamp, {-0.02, across(0.05), 0.62}, {0.02, 0.3, 0.14}},
+      {kTailLamp, {-0.02, across(width - 0.35), 0.62}, {0.02, 0.3, 0.14}},
+      {kPlate, {-0.02, across(0.5 * width - 0.26), 0.5}, {0.02, 0.52, 0.11}},
+      shadow(length, width)};
+  if (!is_parked) {
+    const double side = 0.5 * width;
+    parts.insert(parts.end(), {{kHeadLamp, {length, 0.05 - side, 0.58}, {0.02, 0.36, 0.16}},
+                               {kHeadLamp, {length, side - 0.41, 0.58}, {0.02, 0.36, 0.16}},
+                               {kTyre, {length, 0.45 - side, 0.45}, {0.015, width - 0.9, 0.2}}});
+  }
+  add_parts(at, parts, {.seed = seed, .moves = moves}, scene);
 }
 
 void add_lorry(const RoadFrame& at, Draw draw, bool moves, Scene& scene) {
@@ -137,56 +126,46 @@ void add_lorry(const RoadFrame& at, Draw draw, bool moves, Scene& scene) {
       {kTailLamp, {-0.02, -kLeft_m - 0.55, 0.75}, {0.02, 0.45, 0.16}},
       shadow(kLorryLength_m, kWidth_m),
   }};
-  add_parts(at, at.position, parts, common, scene);
+  add_parts(at, parts, common, scene);
 }
 
 void add_person(const RoadFrame& at, Draw draw, double stride_rad, bool moves, Scene& scene) {
   const double tall = draw.in(0.92, 1.08);
   const Rgb coat = any_paint(draw);
-  const Rgb trousers = scaled(any_paint(draw), 0.5F);
+  const Rgb trousers = any_paint(draw) * 0.5F;
   const Style common{.seed = draw.bits(), .moves = moves};
   const Rgb skin = {0.5F, 0.36F, 0.28F};
-  const std::array<Part, 3> body = {{
+  // Legs and arms lean forward and back by turns.
+  const double swing_m = 0.3 * std::sin(stride_rad);
+  const auto limb = [](double side_m, double top_m, double length_m, double reach_m,
+                       const Rgb& colour, double width_m) {
+    const Vec3 foot(reach_m - 0.5 * width_m, side_m - 0.5 * width_m, top_m - length_m);
+    return Part{colour, foot, {width_m, width_m, length_m}, materials::cloth, reach_m};
+  };
+  const std::array<Part, 7> body = {{
       {coat, {-0.12, -0.22, 0.82 * tall}, {0.24, 0.44, 0.62 * tall}, materials::cloth},
       {skin, {-0.1, -0.09, 1.48 * tall}, {0.2, 0.18, 0.25}, materials::cloth},
       shadow(0.3, 0.35),
+      limb(-0.11, 0.85 * tall, 0.84 * tall, swing_m, trousers, 0.16),
+      limb(0.11, 0.85 * tall, 0.84 * tall, -swing_m, trousers, 0.16),
+      limb(-0.28, 1.4 * tall, 0.6 * tall, -swing_m, coat, 0.1),
+      limb(0.28, 1.4 * tall, 0.6 * tall, swing_m, coat, 0.1),
   }};
-  add_parts(at, at.position, body, common, scene);
-  // Legs and arms lean forward and back by turns.
-  const double swing_m = 0.3 * std::sin(stride_rad);
-  const auto add_limb = [&](double side_m, double top_m, double length_m, double reach_m,
-                            const Rgb& colour, double width_m) {
-    Style style = common;
-    style.albedo = colour;
-    style.material = materials::cloth;
-    const Vec3 foot = at.position + (reach_m - 0.5 * width_m) * at.forward +
-                      (side_m - 0.5 * width_m) * at.right + (top_m - length_m) * at.up;
-    scene.add_box(
-        foot, {width_m * at.forward, width_m * at.right, length_m * at.up - reach_m * at.forward},
-        style);
-  };
-  add_limb(-0.11, 0.85 * tall, 0.84 * tall, swing_m, trousers, 0.16);
-  add_limb(0.11, 0.85 * tall, 0.84 * tall, -swing_m, trousers, 0.16);
-  add_limb(-0.28, 1.4 * tall, 0.6 * tall, -swing_m, coat, 0.1);
-  add_limb(0.28, 1.4 * tall, 0.6 * tall, swing_m, coat, 0.1);
+  add_parts(at, body, common, scene);
 }
 
-void House::add_walls(double height_m) {
+void House::add(double eaves_m, double rise_m, std::uint32_t roof_seed) {
   const auto& [fl, fr, br, bl] = plan;
   const Vec3 down = -kFoundation_m * up;
-  const Vec3 top = height_m * up;
+  const Vec3 top = eaves_m * up;
   for (const auto& [left, right] : {std::pair(fl, fr), std::pair(bl, fl), std::pair(fr, br)}) {
     const double length_m = (right - left).norm();
-    style.size = {static_cast<float>(length_m), static_cast<float>(height_m)};
+    style.size = {static_cast<float>(length_m), static_cast<float>(eaves_m)};
     scene.add_face(
         {left + down, right + down, right + top, left + top},
-        {Vec2(0.0, -kFoundation_m), Vec2(length_m, -kFoundation_m), Vec2(length_m, height_m)},
+        {Vec2(0.0, -kFoundation_m), Vec2(length_m, -kFoundation_m), Vec2(length_m, eaves_m)},
         style);
   }
-}
-
-void House::add_roof(double eaves_m, double rise_m, std::uint32_t seed) {
-  const auto& [fl, fr, br, bl] = plan;
   const Vec3 left_ridge = 0.5 * (fl + bl) + (eaves_m + rise_m) * up;
   const Vec3 right_ridge = 0.5 * (fr + br) + (eaves_m + rise_m) * up;
   const Vec3 over_left = 0.12 * (fl - bl).normalized() - 0.1 * up;
@@ -199,8 +178,8 @@ void House::add_roof(double eaves_m, double rise_m, std::uint32_t seed) {
       {front_left, front_right, right_ridge, left_ridge},
       {Vec2(0, 0), Vec2(length_m, 0), Vec2(length_m, slope_m), Vec2(0, slope_m)},
       {.material = materials::roof,
-       .seed = seed,
-       .albedo = (seed & 1U) != 0U ? Rgb{0.40F, 0.20F, 0.14F} : Rgb{0.24F, 0.23F, 0.23F}});
+       .seed = roof_seed,
+       .albedo = (roof_seed & 1U) != 0U ? Rgb{0.40F, 0.20F, 0.14F} : Rgb{0.24F, 0.23F, 0.23F}});
   style.material = materials::plain_wall;
   for (const auto& [front, back, ridge] :
        {std::tuple(fl, bl, left_ridge), std::tuple(fr, br, right_ridge)}) {
@@ -245,9 +224,8 @@ void add_side_streets(const RoadFrame& middle, std::uint64_t seed, Scene& scene)
         -Vec3::UnitY(),
         {.material = materials::facade, .seed = draw.bits()},
         scene};
-    house.style.albedo = scaled({0.72F, 0.64F, 0.48F}, draw.in_float(0.7, 1.2));
-    house.add_walls(wall);
-    house.add_roof(wall, 2.4, draw.bits());
+    house.style.albedo = Rgb{0.72F, 0.64F, 0.48F} * draw.in_float(0.7, 1.2);
+    house.add(wall, 2.4, draw.bits());
   }
   add_lights(middle, scene);
 }

@@ -6,18 +6,15 @@
 
 namespace stemvo::synth {
 
-/// At the kerb on the right, seen from behind.
-void add_parked_car(const RoadFrame& place, Draw draw, Scene& scene);
-
 /// Things that may move stand on their shadow. `at`: the middle of the rear end, and the axes,
-/// where `forward` is the way they go.
-void add_car(const RoadFrame& at, Draw draw, bool moves, Scene& scene);
+/// where `forward` is the way they go. A parked car is plain and seen from behind.
+void add_car(const RoadFrame& at, Draw draw, bool moves, Scene& scene, bool is_parked = false);
 inline constexpr double kLorryLength_m = 8.2;
 void add_lorry(const RoadFrame& at, Draw draw, bool moves, Scene& scene);
 /// `stride_rad`: how far the steps are; a person who stands keeps it.
 void add_person(const RoadFrame& at, Draw draw, double stride_rad, bool moves, Scene& scene);
 
-inline constexpr Rgb kAsphalt = {0.345F, 0.345F, 0.35F};
+inline const Rgb kAsphalt = {0.345F, 0.345F, 0.35F};
 /// Half the width of the road that crosses.
 inline constexpr int kCrossingHalf_m = 4;
 /// It ends so far from the street's middle, at a house.
@@ -29,9 +26,8 @@ struct House {
   Style style;
   Scene& scene;
 
-  void add_walls(double height_m);
-  /// A gable roof with its ridge along the street, over the eaves by 12 cm.
-  void add_roof(double eaves_m, double rise_m, std::uint32_t seed);
+  /// Walls, and a gable roof with its ridge along the street, over the eaves by 12 cm.
+  void add(double eaves_m, double rise_m, std::uint32_t roof_seed);
 };
 
 /// The scene beyond the street's edges: the crossing road, hedges along it, houses at its ends, and

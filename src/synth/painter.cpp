@@ -17,7 +17,6 @@ constexpr int kSubColumns = 2;
 constexpr int kSamples = kSubRows * kSubColumns;
 /// The samples of sub-row j begin here, in half pixels.
 constexpr std::array<double, kSubRows> kRowShift = {0.125, 0.625, 0.375, 0.875};
-constexpr int kNothing = -1;  ///< in place of a face's index: the backdrop
 
 /// Position of a sample relative to the centre of its pixel, in pixels.
 Vec2 sample(int k) {
@@ -34,14 +33,13 @@ std::array<float, kSamples> sample_weights(double fill) {
   if (fill == 1.0) {
     return weights;
   }
-  const auto overlap = [&](double middle, double width) {
-    const double end = std::min(middle + 0.5 * width, 0.5 * fill);
-    return std::max(0.0, end - std::max(middle - 0.5 * width, -0.5 * fill));
-  };
+  const Vec2 half(0.5, 0.5);
+  const Vec2 half_cell(0.5 / kSubColumns, 0.5 / kSubRows);
+  const Eigen::AlignedBox2d square(-fill * half, fill * half);
   float sum = 0.0F;
   for (int k = 0; k < kSamples; ++k) {
-    const Vec2 at = sample(k);
-    const double area = overlap(at.x(), 1.0 / kSubColumns) * overlap(at.y(), 1.0 / kSubRows);
+    const Eigen::AlignedBox2d cell(sample(k) - half_cell, sample(k) + half_cell);
+    const double area = square.intersection(cell).volume();
     sum += weights[static_cast<std::size_t>(k)] = static_cast<float>(area);
   }
   for (float& weight : weights) {
@@ -55,11 +53,13 @@ double at(const Vec3& linear, const Vec2& pixel) {
   return linear.x() * pixel.x() + linear.y() * pixel.y() + linear.z();
 }
 
+const Style kBackdrop;
+
 /// A face as the camera sees it. 1/z and texture/z of a plane are linear over the image, which
 /// makes depth and texture exact at every pixel (no interpolation between corners).
 struct ScreenFace {
-  const Style* style = nullptr;
-  Vec3 inverse_z;
+  const Style* style = &kBackdrop;
+  Vec3 inverse_z = Vec3::Zero();
   std::array<Vec3, 2> texture_over_z;
   std::array<Vec2, 5> outline;  ///< pixels, clipped at the near plane
   std::size_t num_points = 0;
@@ -90,12 +90,12 @@ bool project_outline(std::span<const Vec3> points, const Camera& camera, ScreenF
 
 /// nullopt: behind the camera, outside the image, or seen edge-on.
 std::optional<ScreenFace> project_face(const Face& face,
-                                       const Rigid3& scene_from_camera,
+                                       const Vec3& camera_in_scene,
                                        const Eigen::Matrix3d& camera_from_scene,
                                        const Camera& camera) {
   std::array<Vec3, 4> points;
   for (std::size_t i = 0; i < face.num_points; ++i) {
-    points[i] = camera_from_scene * (face.points[i].cast<double>() - scene_from_camera.translation);
+    points[i] = camera_from_scene * (face.points[i].cast<double>() - camera_in_scene);
   }
   ScreenFace out;
   out.style = &face.style;
@@ -154,43 +154,26 @@ int first_from(double value, int end) {
   return static_cast<int>(std::ceil(std::clamp(value, 0.0, static_cast<double>(end))));
 }
 
-cv::Vec3f to_vector(const Rgb& colour) { return {colour[0], colour[1], colour[2]}; }
-
 struct FramePainter {
   const Camera& camera;
   const Textures& textures;
   Eigen::Matrix3d world_from_camera;
-  std::vector<ScreenFace> faces;
   cv::Range rows;
   double fill;
-  std::array<float, kSamples> weights;            ///< of a pixel's samples; their sum is 1
-  int band_begin = 0;                             ///< first row of the present band
-  int row_width = camera.width_px * kSubColumns;  ///< samples
-  std::vector<float> inverse_z = {};              ///< per sample of the band
-  std::vector<int> ids = {};                      ///< the same: the nearest face
-
-  RenderedFrame paint() {
-    const cv::Size size(camera.width_px, rows.size());
-    RenderedFrame frame{cv::Mat(size, CV_32FC3), cv::Mat(size, CV_32FC1),
-                        cv::Mat(size, CV_8UC1, cv::Scalar(0))};
-    for (band_begin = rows.start; band_begin < rows.end; band_begin += kBandRows) {
-      const int band_end = std::min(band_begin + kBandRows, rows.end);
-      draw_band(band_begin, band_end);
-      for (int row = band_begin; row < band_end; ++row) {
-        for (int column = 0; column < camera.width_px; ++column) {
-          resolve(column, row, frame);
-        }
-      }
-    }
-    return frame;
-  }
+  std::array<float, kSamples> weights = sample_weights(fill);  ///< of a pixel's; their sum is 1
+  std::vector<ScreenFace> faces = std::vector<ScreenFace>(1);  ///< the first: the backdrop
+  int band_begin = 0;                                          ///< first row of the present band
+  int row_width = camera.width_px * kSubColumns;               ///< samples
+  std::vector<float> inverse_z = {};                           ///< per sample of the band
+  std::vector<int> ids = {};                                   ///< the same: the nearest face
 
   /// For each sample of the rows [first_row, end_row): the nearest face.
   void draw_band(int first_row, int end_row) {
+    band_begin = first_row;
     const int num_sub_rows = (end_row - first_row) * kSubRows;
     const auto count = static_cast<std::size_t>(row_width * num_sub_rows);
     inverse_z.assign(count, 0.0F);  // infinitely far
-    ids.assign(count, kNothing);
+    ids.assign(count, 0);
     const double first_y = first_row + sample(0).y();
     const auto sub_row_from = [&](double y) {
       return first_from((y - first_y) * kSubRows, num_sub_rows);
@@ -245,44 +228,43 @@ struct FramePainter {
           weight += weights[static_cast<std::size_t>(k)];
         }
       }
+      const ScreenFace& face = faces[static_cast<std::size_t>(*first)];
       const Vec2 middle = Vec2(column, row) + sum / count;
-      light += colour_of(*first, middle) * weight;
+      light += colour_of(face, middle) * weight;
       if (count > max_count) {
         max_count = count;
+        // At the pixel's centre on the plane of the face; if that point is far off the part of the
+        // face the pixel really sees (an outline seen at a grazing angle), at the middle of that
+        // part.
+        const double mean = at(face.inverse_z, middle);
+        const double centre = at(face.inverse_z, Vec2(column, row));
+        const bool is_near = std::abs(centre - mean) <= 0.1 * mean;
         frame.depth_m.at<float>(row - rows.start, column) =
-            depth_of(*first, Vec2(column, row), middle);
-        frame.moving.at<uchar>(row - rows.start, column) = moves(*first) ? 255 : 0;
+            static_cast<float>(1.0 / (is_near ? centre : mean));
+        frame.moving.at<uchar>(row - rows.start, column) = face.style->moves ? 255 : 0;
       }
     }
     frame.rgb.at<cv::Vec3f>(row - rows.start, column) = light;
   }
 
-  [[nodiscard]] bool moves(int id) const {
-    return id != kNothing && faces[static_cast<std::size_t>(id)].style->moves;
-  }
-
-  [[nodiscard]] cv::Vec3f colour_of(int id, const Vec2& pixel) const {
+  [[nodiscard]] cv::Vec3f colour_of(const ScreenFace& face, const Vec2& pixel) const {
     const Vec2 ray = camera.normalize(pixel);
     const Vec3 direction(ray.x(), ray.y(), 1.0);
-    const auto backdrop = [&] {
-      return to_vector(sky_colour(world_from_camera * direction, 1.0 / camera.fx_px, textures));
-    };
-    if (id == kNothing) {
-      return backdrop();
-    }
-    const ScreenFace& face = faces[static_cast<std::size_t>(id)];
     const double z = 1.0 / at(face.inverse_z, pixel);
     const Material material = face.style->material;
     const Rgb albedo =
         material == nullptr ? face.style->albedo : material(sample_of(face, pixel, z));
     const auto distance_m = static_cast<float>(z * direction.norm());
     const float haze = 1.0F - std::exp(-distance_m / 700.0F);
-    const cv::Vec3f lit =
-        to_vector(albedo) * (face.style->light * (1.0F - haze)) + to_vector(kHaze) * haze;
+    const cv::Vec3f lit = albedo * (face.style->light * (1.0F - haze)) + kHaze * haze;
     // Things dissolve into the backdrop and are gone before the drawn part of a street ends:
     // nothing pops up.
     const float far = smooth_step(110.0F, 165.0F, distance_m);
-    return far > 0.0F ? lit * (1.0F - far) + backdrop() * far : lit;
+    if (far == 0.0F) {
+      return lit;
+    }
+    const Rgb backdrop = sky_colour(world_from_camera * direction, 1.0 / camera.fx_px, textures);
+    return lit * (1.0F - far) + backdrop * far;
   }
 
   [[nodiscard]] Sample sample_of(const ScreenFace& face, const Vec2& pixel, double z) const {
@@ -298,38 +280,37 @@ struct FramePainter {
     texture(face.texture_over_z[1], sample.v, sample.width_v);
     return sample;
   }
-
-  /// At the pixel's centre on the plane of the face; if that point is far off the part of the face
-  /// the pixel really sees (an outline seen at a grazing angle), at the middle of that part.
-  [[nodiscard]] float depth_of(int id, const Vec2& pixel, const Vec2& middle) const {
-    if (id == kNothing) {
-      return std::numeric_limits<float>::infinity();
-    }
-    const Vec3& over_image = faces[static_cast<std::size_t>(id)].inverse_z;
-    const double seen = at(over_image, middle);
-    const double centre = at(over_image, pixel);
-    const bool is_near = std::abs(centre - seen) <= 0.1 * seen;
-    return static_cast<float>(1.0 / (is_near ? centre : seen));
-  }
 };
 
 }  // namespace
 
-RenderedFrame paint(std::span<const Face* const> faces,
-                    const Rigid3& scene_from_camera,
+RenderedFrame paint(const Scene& scene,
+                    const Rigid3& world_from_camera,
                     const Camera& camera,
                     const Textures& textures,
                     cv::Range rows,
                     double fill) {
-  FramePainter painter{
-      camera, textures, scene_from_camera.rotation_matrix(), {}, rows, fill, sample_weights(fill)};
+  FramePainter painter{camera, textures, world_from_camera.rotation_matrix(), rows, fill};
+  const Vec3 in_scene = world_from_camera.translation - scene.origin;
   const Eigen::Matrix3d camera_from_scene = painter.world_from_camera.transpose();
-  for (const Face* face : faces) {
-    if (const auto seen = project_face(*face, scene_from_camera, camera_from_scene, camera)) {
+  for (const Face& face : scene.faces) {
+    if (const auto seen = project_face(face, in_scene, camera_from_scene, camera)) {
       painter.faces.push_back(*seen);
     }
   }
-  return painter.paint();
+  const cv::Size size(camera.width_px, rows.size());
+  RenderedFrame frame{cv::Mat(size, CV_32FC3), cv::Mat(size, CV_32FC1),
+                      cv::Mat(size, CV_8UC1, cv::Scalar(0))};
+  for (int begin = rows.start; begin < rows.end; begin += kBandRows) {
+    const int end = std::min(begin + kBandRows, rows.end);
+    painter.draw_band(begin, end);
+    for (int row = begin; row < end; ++row) {
+      for (int column = 0; column < camera.width_px; ++column) {
+        painter.resolve(column, row, frame);
+      }
+    }
+  }
+  return frame;
 }
 
 }  // namespace stemvo::synth

@@ -10,53 +10,6 @@
 #include "synth/sensor.hpp"
 
 namespace stemvo::synth {
-namespace {
-
-std::vector<const Face*> pointers_to(const Scene& scene) {
-  std::vector<const Face*> faces;
-  for (const Face& face : scene.faces()) {
-    faces.push_back(&face);
-  }
-  return faces;
-}
-
-/// The pose in the axes of a scene around `origin`.
-Rigid3 seen_from(const Vec3& origin, const Rigid3& world_from_camera) {
-  return {world_from_camera.rotation, world_from_camera.translation - origin};
-}
-
-/// How a frame is put together from moments: each group of rows is the mean over some of them.
-struct Shutter {
-  double row_frames;  ///< readout of a row
-  double exposure_frames;
-  int rows_at_once;
-  int moments;  ///< odd, so that one is in the middle
-
-  /// Frames after the middle of the exposure of the middle row.
-  [[nodiscard]] double delay(double row, double height_px, int moment) const {
-    return row_frames * (row + 0.5 - 0.5 * height_px) +
-           exposure_frames * ((moment + 0.5) / moments - 0.5);
-  }
-};
-
-/// Steps below 1 px within an exposure and below 0.1 px from rows to rows.
-Shutter plan_shutter(const RenderOptions& options,
-                     double rate_hz,
-                     const Camera& camera,
-                     double px_per_s) {
-  constexpr int kMaxMoments = 31;
-  constexpr int kMaxRows = 16;
-  Shutter shutter{};
-  shutter.row_frames = options.readout_s / camera.height_px * rate_hz;
-  shutter.exposure_frames = options.exposure_s * rate_hz;
-  const double blur_px = std::min(px_per_s * options.exposure_s, 1.0 * kMaxMoments);
-  shutter.moments = std::min(1 + 2 * static_cast<int>(std::ceil(0.5 * blur_px)), kMaxMoments);
-  const double row_px = px_per_s * options.readout_s / camera.height_px;
-  shutter.rows_at_once = static_cast<int>(std::clamp(0.1 / (row_px + 1e-9), 1.0, 1.0 * kMaxRows));
-  return shutter;
-}
-
-}  // namespace
 
 Renderer::Renderer(CameraPath path,
                    const Camera& camera,
@@ -66,13 +19,21 @@ Renderer::Renderer(CameraPath path,
       camera_(camera),
       seed_(seed),
       options_(options),
-      noise_seed_(options.visit == 0 ? seed : hash_of(seed, 'N', options.visit)),
       textures_(seed),
-      daylight_(daylight(seed, options.visit)) {
+      ambient_(std::holds_alternative<Walk>(path_) ? 0.7 : 0.36) {  // walls light each other
   if (const auto* drive = std::get_if<Drive>(&path_); drive != nullptr && options.traffic) {
     traffic_ = plan_traffic(*drive, hash_of(seed, 'T', options.visit));
   }
-  gains_.assign(world_from_camera().size(), daylight_.gain);
+  Draw draw = options.visit == 0 ? Draw(seed, 'L') : Draw(seed, 'L', options.visit);
+  const double azimuth = draw.in(0.0, 2.0 * kPi);
+  const double height = draw.in(0.6, 0.8);  // rad
+  to_sun_ = {std::cos(height) * std::sin(azimuth), -std::sin(height),
+             std::cos(height) * std::cos(azimuth)};
+  gains_.assign(world_from_camera().size(), 1.0F);
+  if (options.visit != 0) {
+    ambient_ *= draw.in(0.8, 1.25);
+    gains_.assign(gains_.size(), draw.in_float(0.75, 1.25));
+  }
   if (options.follows_light) {
     follow_light();
   }
@@ -87,20 +48,9 @@ double Renderer::rate_hz() const {
   return std::holds_alternative<Walk>(path_) ? options_.walk_rate_hz : kDriveRate_hz;
 }
 
-RenderedFrame Renderer::render(std::size_t index) const {
-  RenderedFrame frame = light_of(index);
-  const std::uint64_t noise = hash_of(noise_seed_, 'n', index);
-  frame.rgb = options_.small_chip ? expose_chip(frame.rgb, gains_[index], noise)
-                                  : expose(frame.rgb, gains_[index], noise);
-  return frame;
-}
-
 Scene Renderer::still_scene(std::size_t index) const {
-  const auto* walk = std::get_if<Walk>(&path_);
-  const double ambient = walk != nullptr ? 0.7 : 0.36;  // walls light each other
-  Scene scene(world_from_camera()[index].translation, daylight_.to_sun,
-              ambient * daylight_.ambient_factor);
-  if (walk != nullptr) {
+  Scene scene{world_from_camera()[index].translation, to_sun_, ambient_};
+  if (const auto* walk = std::get_if<Walk>(&path_)) {
     add_courtyard(walk->courtyard, scene);
   } else {
     const auto& drive = std::get<Drive>(path_);
@@ -109,53 +59,53 @@ Scene Renderer::still_scene(std::size_t index) const {
   return scene;
 }
 
-RenderedFrame Renderer::light_of(std::size_t index) const {
-  Scene scene = still_scene(index);
-  if (options_.exposure_s > 0.0 || options_.readout_s > 0.0) {
-    return light_over_time(index, scene);
-  }
-  if (traffic_.add_at) {
-    traffic_.add_at(static_cast<double>(index), scene);
-  }
-  const Rigid3& pose = world_from_camera()[index];
-  return paint(pointers_to(scene), seen_from(pose.translation, pose), camera_, textures_,
-               {0, camera_.height_px}, options_.small_chip ? chip::kFill : 1.0);
-}
-
-RenderedFrame Renderer::light_over_time(std::size_t index, const Scene& still) const {
+RenderedFrame Renderer::render(std::size_t index) const {
+  constexpr double kMaxBlur_px = 30.0;
   const auto frame_index = static_cast<double>(index);
   const Trajectory& poses = world_from_camera();
-  const Vec3 origin = poses[index].translation;
   const Rigid3 step =
       pose_at(poses, frame_index - 0.5).inverse() * pose_at(poses, frame_index + 0.5);
   const double near_m = std::holds_alternative<Walk>(path_) ? 1.5 : 4.0;
   const double px_per_s =
       camera_.fx_px * rate_hz() * (step.angle_rad() + step.translation.norm() / near_m);
-  const Shutter shutter = plan_shutter(options_, rate_hz(), camera_, px_per_s);
+  // Steps below 1 px within an exposure and below 0.1 px from rows to rows. The number of moments
+  // is odd, so that one is in the middle.
+  const double blur_px = std::min(px_per_s * options_.exposure_s, kMaxBlur_px);
+  const int moments = 1 + 2 * static_cast<int>(std::ceil(0.5 * blur_px));
+  const double row_px = px_per_s * options_.readout_s / camera_.height_px;
+  const double max_rows = options_.readout_s > 0.0 ? 16.0 : camera_.height_px;
+  const int rows_at_once = static_cast<int>(std::clamp(0.1 / (row_px + 1e-9), 1.0, max_rows));
+  const double row_frames = options_.readout_s / camera_.height_px * rate_hz();
+  const double exposure_frames = options_.exposure_s * rate_hz();
+  Scene scene = still_scene(index);
+  const std::size_t num_still = scene.faces.size();
   RenderedFrame frame{cv::Mat(camera_.height_px, camera_.width_px, CV_32FC3, cv::Scalar::all(0)),
                       cv::Mat(camera_.height_px, camera_.width_px, CV_32FC1),
                       cv::Mat(camera_.height_px, camera_.width_px, CV_8UC1)};
-  const std::vector<const Face*> still_faces = pointers_to(still);
-  for (int row = 0; row < camera_.height_px; row += shutter.rows_at_once) {
-    const cv::Range rows(row, std::min(row + shutter.rows_at_once, camera_.height_px));
+  for (int row = 0; row < camera_.height_px; row += rows_at_once) {
+    const cv::Range rows(row, std::min(row + rows_at_once, camera_.height_px));
     const double middle_row = 0.5 * (rows.start + rows.end - 1);
-    for (int moment = 0; moment < shutter.moments; ++moment) {
-      const double at = frame_index + shutter.delay(middle_row, camera_.height_px, moment);
-      Scene moving = still.without_faces();
-      std::vector<const Face*> faces = still_faces;
+    for (int moment = 0; moment < moments; ++moment) {
+      const double delay = row_frames * (middle_row + 0.5 - 0.5 * camera_.height_px) +
+                           exposure_frames * ((moment + 0.5) / moments - 0.5);
+      const double at = frame_index + delay;
       if (traffic_.add_at) {
-        traffic_.add_at(at, moving);
-        std::ranges::copy(pointers_to(moving), std::back_inserter(faces));
+        scene.faces.resize(num_still);
+        traffic_.add_at(at, scene);
       }
-      const RenderedFrame part = paint(faces, seen_from(origin, pose_at(poses, at)), camera_,
-                                       textures_, rows, options_.small_chip ? chip::kFill : 1.0);
-      frame.rgb.rowRange(rows) += part.rgb / shutter.moments;
-      if (moment == shutter.moments / 2) {
+      const RenderedFrame part = paint(scene, pose_at(poses, at), camera_, textures_, rows,
+                                       options_.small_chip ? chip::kFill : 1.0);
+      frame.rgb.rowRange(rows) += part.rgb / moments;
+      if (moment == moments / 2) {
         part.depth_m.copyTo(frame.depth_m.rowRange(rows));
         part.moving.copyTo(frame.moving.rowRange(rows));
       }
     }
   }
+  const std::uint64_t noise =
+      hash_of(options_.visit == 0 ? seed_ : hash_of(seed_, 'N', options_.visit), 'n', index);
+  frame.rgb = options_.small_chip ? expose_chip(frame.rgb, gains_[index], noise)
+                                  : expose(frame.rgb, gains_[index], noise);
   return frame;
 }
 
@@ -163,23 +113,23 @@ RenderedFrame Renderer::light_over_time(std::size_t index, const Scene& still) c
 void Renderer::follow_light() {
   constexpr double kSettle_s = 0.5;
   constexpr double kTarget = 0.36;
-  Camera coarse = camera_;
-  const double scale = 32.0 / camera_.width_px;
-  coarse.fx_px *= scale;
-  coarse.fy_px *= scale;
-  coarse.cx_px *= scale;
-  coarse.cy_px *= scale;
-  coarse.width_px = 32;
-  coarse.height_px = std::max(1, static_cast<int>(camera_.height_px * scale));
+  constexpr int kWidth_px = 32;
+  const double scale = static_cast<double>(kWidth_px) / camera_.width_px;
+  const int height_px = std::max(1, static_cast<int>(camera_.height_px * scale));
+  const Camera coarse{camera_.fx_px * scale,
+                      camera_.fy_px * scale,
+                      camera_.cx_px * scale,
+                      camera_.cy_px * scale,
+                      kWidth_px,
+                      height_px};
   std::vector<double> means(gains_.size());
   cv::parallel_for_({0, static_cast<int>(means.size())}, [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
       const auto index = static_cast<std::size_t>(i);
-      const Scene scene = still_scene(index);
-      const Rigid3& pose = world_from_camera()[index];
-      const cv::Scalar mean = cv::mean(paint(pointers_to(scene), seen_from(pose.translation, pose),
-                                             coarse, textures_, {0, coarse.height_px})
-                                           .rgb);
+      const Rigid3 pose = pose_at(world_from_camera(), i);
+      const RenderedFrame frame =
+          paint(still_scene(index), pose, coarse, textures_, {0, height_px});
+      const cv::Scalar mean = cv::mean(frame.rgb);
       means[index] = (mean[0] + mean[1] + mean[2]) / 3.0;
     }
   });

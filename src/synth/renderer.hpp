@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <variant>
 #include <vector>
 
@@ -24,10 +23,9 @@ struct RenderedFrame {
 };
 
 /// A perfect camera sees this at one moment on the rows [rows.start, rows.end): frames of so many
-/// rows; `rgb` is CV_32FC3, where 1 is white. `scene_from_camera`: in the axes of the faces'
-/// points.
-[[nodiscard]] RenderedFrame paint(std::span<const Face* const> faces,
-                                  const Rigid3& scene_from_camera,
+/// rows; `rgb` is CV_32FC3, where 1 is white.
+[[nodiscard]] RenderedFrame paint(const Scene& scene,
+                                  const Rigid3& world_from_camera,
                                   const Camera& camera,
                                   const Textures& textures,
                                   cv::Range rows,
@@ -50,18 +48,15 @@ class Renderer {
 
  private:
   [[nodiscard]] Scene still_scene(std::size_t index) const;
-  /// Light on the chip, before the sensor.
-  [[nodiscard]] RenderedFrame light_of(std::size_t index) const;
-  [[nodiscard]] RenderedFrame light_over_time(std::size_t index, const Scene& still) const;
   void follow_light();
 
   CameraPath path_;
   Camera camera_;
   std::uint64_t seed_;
   RenderOptions options_;
-  std::uint64_t noise_seed_;
   Textures textures_;
-  Daylight daylight_;
+  Vec3 to_sun_;
+  double ambient_;
   Traffic traffic_;           ///< empty: nothing moves
   std::vector<float> gains_;  ///< per frame
 };

@@ -65,7 +65,7 @@ void Scene::add_face(std::initializer_list<Vec3> corners,
   constexpr double kSun = 0.95;
   Face face;
   for (const Vec3& corner : corners) {
-    face.points[face.num_points++] = (corner - origin_).cast<float>();
+    face.points[face.num_points++] = (corner - origin).cast<float>();
   }
   for (std::size_t i = 0; i < face.texture.size(); ++i) {
     face.texture[i] = texture.begin()[i].cast<float>();
@@ -73,13 +73,13 @@ void Scene::add_face(std::initializer_list<Vec3> corners,
   face.style = style;
   const Vec3* at = corners.begin();
   Vec3 normal = (at[1] - at[0]).cross(at[2] - at[0]).normalized();
-  if (normal.dot(at[0] - origin_) > 0.0) {
+  if (normal.dot(at[0] - origin) > 0.0) {
     normal = -normal;  // towards the camera
   }
   const double sky = 0.12 * -normal.y();
-  const double light = ambient_ + sky + kSun * std::max(0.0, normal.dot(to_sun_));
+  const double light = ambient + sky + kSun * std::max(0.0, normal.dot(to_sun));
   face.style.light = static_cast<float>(light * static_cast<double>(style.light));
-  faces_.push_back(face);
+  faces.push_back(face);
 }
 
 void Scene::add_patch(const std::array<Vec3, 4>& corners,

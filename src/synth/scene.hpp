@@ -33,15 +33,11 @@ struct Face {
 };
 
 /// Surroundings of one frame: part of a street, or a courtyard.
-class Scene {
- public:
-  /// `ambient`: light on what the sun does not reach.
-  Scene(const Vec3& origin, const Vec3& to_sun, double ambient)
-      : origin_(origin), to_sun_(to_sun), ambient_(ambient) {}
-
-  [[nodiscard]] const std::vector<Face>& faces() const { return faces_; }
-  /// The same place and light, empty.
-  [[nodiscard]] Scene without_faces() const { return {origin_, to_sun_, ambient_}; }
+struct Scene {
+  Vec3 origin;  ///< of the faces' points, in the world
+  Vec3 to_sun;
+  double ambient;  ///< light on what the sun does not reach
+  std::vector<Face> faces = {};
 
   /// Three or four corners in order; texture coordinates at the first three. `light` is set from
   /// the normal on the side of the camera; `style.light` multiplies it.
@@ -56,12 +52,6 @@ class Scene {
   void add_prism(const Vec3& foot, double radius_m, double height_m, const Style& style);
   /// Five sides of a box (no floor), `edges` are its full edges from `corner`: along, across, up.
   void add_box(const Vec3& corner, const std::array<Vec3, 3>& edges, const Style& style);
-
- private:
-  Vec3 origin_;
-  Vec3 to_sun_;
-  double ambient_;
-  std::vector<Face> faces_;
 };
 
 /// Overlapping balls of leaves of different size and tone, with loose leaves.

@@ -31,20 +31,16 @@ cv::Mat read_out(const cv::Mat& light, std::uint64_t seed, const Level& level) {
                            0.5F * static_cast<float>(light.rows - 1));
   const float corner2 = std::max(centre.dot(centre), 1.0F);
   cv::Mat rgb(light.size(), CV_8UC3);
-  for (int y = 0; y < light.rows; ++y) {
-    const auto* from = light.ptr<cv::Vec3f>(y);
-    auto* to = rgb.ptr<cv::Vec3b>(y);
-    for (int x = 0; x < light.cols; ++x) {
-      const cv::Point2f off = cv::Point2f(cv::Point(x, y)) - centre;
-      const float gain = 1.0F - kCornerLoss * off.dot(off) / corner2;
-      const std::uint64_t pixel =
-          seed ^ (static_cast<std::uint64_t>(y) << 32) ^ (static_cast<std::uint64_t>(x) << 2);
-      for (int c = 0; c < 3; ++c) {
-        const float noise = gaussian(mix(pixel + static_cast<std::uint64_t>(c)));
-        to[x][c] = cv::saturate_cast<uchar>(level(from[x][c], gain, noise));
-      }
+  rgb.forEach<cv::Vec3b>([&](cv::Vec3b& to, const int* at) {
+    const cv::Point2f off = cv::Point2f(cv::Point(at[1], at[0])) - centre;
+    const float gain = 1.0F - kCornerLoss * off.dot(off) / corner2;
+    const std::uint64_t pixel =
+        seed ^ (static_cast<std::uint64_t>(at[0]) << 32) ^ (static_cast<std::uint64_t>(at[1]) << 2);
+    for (int c = 0; c < 3; ++c) {
+      const float noise = gaussian(mix(pixel + static_cast<std::uint64_t>(c)));
+      to[c] = cv::saturate_cast<uchar>(level(light.at<cv::Vec3f>(at)[c], gain, noise));
     }
-  }
+  });
   return rgb;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <functional>
 #include <optional>
 
 #include "synth/drive.hpp"
@@ -40,16 +41,13 @@ struct Street {
     });
   }
   [[nodiscard]] bool is_crossed(int knot) const { return is_crossed(home(knot), home(knot) + 1); }
-  [[nodiscard]] int home(int knot) const { return knot - part_of(knot).shift; }
+  [[nodiscard]] int home(int knot) const { return knot - road.part_of(knot).shift; }
   /// Coordinates of the road's texture, near 0 around the camera.
   [[nodiscard]] double u_m(int knot) const {
-    const auto& [begin, end, shift] = part_of(knot);
+    const auto& [begin, end, shift] = road.part_of(knot);
     const double near_m =
         std::clamp(camera_m, static_cast<double>(begin), static_cast<double>(end)) - shift;
     return knot - shift - std::floor(near_m / kTexturePeriod_m) * kTexturePeriod_m;
-  }
-  [[nodiscard]] const RoadPart& part_of(int knot) const {
-    return *std::ranges::upper_bound(road.parts(), knot, {}, &RoadPart::end);
   }
   /// The same on the left (-1) and on the right (1): build(draw, side, arc_m).
   template <typename Build>
@@ -121,33 +119,30 @@ void add_ground(const Street& street) {
     Material material;  ///< of the strip to its right
     Rgb albedo;
   };
-  constexpr Rgb kStone = {0.46F, 0.445F, 0.42F};
-  constexpr Rgb kPaving = {0.43F, 0.41F, 0.39F};
-  constexpr Rgb kGreen = {0.24F, 0.32F, 0.13F};
+  const Rgb kStone = {0.46F, 0.445F, 0.42F};
+  const Rgb kPaving = {0.43F, 0.41F, 0.39F};
+  const Rgb kGreen = {0.24F, 0.32F, 0.13F};
   constexpr double kKerb_m = 0.12;
-  constexpr std::array<Line, 10> kLines = {{{-kStreetHalfWidth_m, 0.25, materials::grass, kGreen},
-                                            {-7.2, kKerb_m, materials::sidewalk, kPaving},
-                                            {-5.35, kKerb_m, materials::kerb, kStone},
-                                            {-5.2, kKerb_m, materials::kerb, kStone},
-                                            {-5.2, 0.0, materials::asphalt, kAsphalt},
-                                            {2.2, 0.0, materials::parking, {0.38F, 0.365F, 0.355F}},
-                                            {4.4, 0.0, materials::kerb, kStone},
-                                            {4.4, kKerb_m, materials::sidewalk, kPaving},
-                                            {6.6, kKerb_m, materials::grass, kGreen},
-                                            {kStreetHalfWidth_m, 0.25, nullptr, {}}}};
+  const std::array<Line, 10> kLines = {{{-kStreetHalfWidth_m, 0.25, materials::grass, kGreen},
+                                        {-7.2, kKerb_m, materials::sidewalk, kPaving},
+                                        {-5.35, kKerb_m, materials::kerb, kStone},
+                                        {-5.2, kKerb_m, materials::kerb, kStone},
+                                        {-5.2, 0.0, materials::asphalt, kAsphalt},
+                                        {2.2, 0.0, materials::parking, {0.38F, 0.365F, 0.355F}},
+                                        {4.4, 0.0, materials::kerb, kStone},
+                                        {4.4, kKerb_m, materials::sidewalk, kPaving},
+                                        {6.6, kKerb_m, materials::grass, kGreen},
+                                        {kStreetHalfWidth_m, 0.25, nullptr, {}}}};
   for (auto left = kLines.begin(); left + 1 != kLines.end(); ++left) {
     const auto right = left + 1;
-    const Style style{.material = left->material,
-                      .seed = static_cast<std::uint32_t>(hash_of(street.seed, 'G')),
-                      .albedo = left->albedo};
-    Style crossed = style;
-    crossed.material = materials::asphalt;
-    crossed.albedo = kAsphalt;
     for (int i = street.window.start; i + 1 < street.window.end; ++i) {
       const bool is_crossed = street.is_crossed(i);
       if (is_crossed && left->lateral_m == right->lateral_m) {
         continue;
       }
+      const Style style{.material = is_crossed ? materials::asphalt : left->material,
+                        .seed = static_cast<std::uint32_t>(hash_of(street.seed, 'G')),
+                        .albedo = is_crossed ? kAsphalt : left->albedo};
       const double low_m = is_crossed ? 0.0 : left->height_m;
       const double high_m = is_crossed ? 0.0 : right->height_m;
       add_segment(street, i,
@@ -155,7 +150,7 @@ void add_ground(const Street& street) {
                     {0, right->lateral_m, high_m},
                     {1, right->lateral_m, high_m},
                     {1, left->lateral_m, low_m}}},
-                  is_crossed ? crossed : style);
+                  style);
       for (const int end : {0, 1}) {  // the strip's end at a crossing road
         if (low_m > 0.0 && street.is_crossed(end == 0 ? i - 1 : i + 1)) {
           add_segment(street, i,
@@ -172,9 +167,9 @@ void add_ground(const Street& street) {
 
 /// Hedge, garden wall or fence at the outer edges, a new kind every 16 m or so.
 void add_borders(const Street& street) {
-  constexpr Style kHedge{.material = materials::hedge, .albedo = {0.15F, 0.22F, 0.09F}};
-  constexpr Style kWall{.material = materials::plain_wall, .albedo = {0.55F, 0.52F, 0.48F}};
-  constexpr Style kFence{.material = materials::fence, .albedo = {0.33F, 0.25F, 0.17F}};
+  const Style kHedge{.material = materials::hedge, .albedo = {0.15F, 0.22F, 0.09F}};
+  const Style kWall{.material = materials::plain_wall, .albedo = {0.55F, 0.52F, 0.48F}};
+  const Style kFence{.material = materials::fence, .albedo = {0.33F, 0.25F, 0.17F}};
   for (const double side : {-1.0, 1.0}) {
     const double lateral_m = side * kStreetHalfWidth_m;
     for (int i = street.window.start; i + 1 < street.window.end; ++i) {
@@ -198,14 +193,14 @@ void add_borders(const Street& street) {
 }
 
 constexpr double kLot_m = 16.0;
-constexpr std::array<Rgb, 8> kPlaster = {{{0.78F, 0.76F, 0.70F},
-                                          {0.72F, 0.64F, 0.48F},
-                                          {0.62F, 0.60F, 0.57F},
-                                          {0.66F, 0.52F, 0.42F},
-                                          {0.50F, 0.33F, 0.26F},
-                                          {0.80F, 0.74F, 0.58F},
-                                          {0.56F, 0.60F, 0.63F},
-                                          {0.44F, 0.42F, 0.40F}}};
+const std::array<Rgb, 8> kPlaster = {{{0.78F, 0.76F, 0.70F},
+                                      {0.72F, 0.64F, 0.48F},
+                                      {0.62F, 0.60F, 0.57F},
+                                      {0.66F, 0.52F, 0.42F},
+                                      {0.50F, 0.33F, 0.26F},
+                                      {0.80F, 0.74F, 0.58F},
+                                      {0.56F, 0.60F, 0.63F},
+                                      {0.44F, 0.42F, 0.40F}}};
 
 void add_building(const Street& street, Draw draw, double side, double arc_m) {
   if (!draw.chance(0.72)) {
@@ -231,10 +226,9 @@ void add_building(const Street& street, Draw draw, double side, double arc_m) {
   const double eaves_m = 0.6 + 2.9 * floors;
   house.style.seed = draw.bits();
   house.style.albedo = kPlaster[draw.bits() % kPlaster.size()];
-  house.style.albedo = scaled(house.style.albedo, draw.in_float(0.85, 1.2));
-  house.add_walls(eaves_m);
+  house.style.albedo = house.style.albedo * draw.in_float(0.85, 1.2);
   const std::uint32_t roof_seed = draw.bits();
-  house.add_roof(eaves_m, draw.in(1.6, 3.2), roof_seed);
+  house.add(eaves_m, draw.in(1.6, 3.2), roof_seed);
 }
 
 void add_tree(const Street& street, double arc_m, double lateral_m, double size, Draw draw) {
@@ -311,16 +305,6 @@ void add_poles(const Street& street) {
   });
 }
 
-void add_parked_cars(const Street& street) {
-  street.for_each_slot(6.5, [&](int slot, double arc_m) {
-    Draw draw(street.seed, 'C', slot);
-    const auto place = street.roomy(arc_m + draw.in(0.5, 1.4), 1.0, 0.95);
-    if (place && draw.chance(0.3)) {
-      add_parked_car(*place, draw, street.scene);
-    }
-  });
-}
-
 /// Nothing stands in the way of the street the camera is in: the window ends where the road comes
 /// back to itself.
 cv::Range visible_window(const RoadCurve& road, double arc_m) {
@@ -342,12 +326,17 @@ void add_street(const RoadCurve& road,
   const Street street{road, arc_m, visible_window(road, arc_m), seed, crossings, scene};
   add_ground(street);
   add_borders(street);
-  street.for_each_lot('H', kLot_m, [&](Draw draw, double side, double begin_m) {
-    add_building(street, draw, side, begin_m);
-  });
+  street.for_each_lot('H', kLot_m, std::bind_front(add_building, std::cref(street)));
   add_plants(street);
   add_poles(street);
-  add_parked_cars(street);
+  street.for_each_slot(6.5, [&](int slot, double slot_m) {
+    Draw draw(seed, 'C', slot);
+    auto place = street.roomy(slot_m + draw.in(0.5, 1.4), 1.0, 0.95);
+    if (place && draw.chance(0.3)) {
+      place->position = place->point(3.35, 0.0);  // parked at the kerb on the right
+      add_car(*place, draw, false, scene, true);
+    }
+  });
   for (int i = street.window.start; i < street.window.end; ++i) {
     if (std::ranges::find(crossings, street.home(i)) != crossings.end()) {
       add_side_streets(road.knot(i), hash_of(seed, 'Q', street.home(i)), scene);

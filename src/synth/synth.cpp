@@ -34,20 +34,18 @@ Camera camera_of(const SyntheticDriveOptions& options) {
   return {f_px, f_px, 607.1928 * scale, 185.2157 * height_px / 376.0, width_px, height_px};
 }
 
-Expected<synth::Drive> plan_drive(const SyntheticDriveOptions& options) {
-  if (!options.trajectory) {
-    return synth::make_own_drive(options.num_frames, options.seed, options.render.traffic);
-  }
-  STEMVO_TRY_GET(auto poses, read_kitti_trajectory(*options.trajectory));
-  poses.resize(std::min(poses.size(), static_cast<std::size_t>(options.num_frames)));
-  return synth::make_drive_along(poses);
-}
-
 Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
   if (options.walk) {
     return synth::make_walk(options.num_frames, options.seed, options.render);
   }
-  STEMVO_TRY_GET(auto drive, plan_drive(options));
+  Trajectory given;
+  if (options.trajectory) {
+    STEMVO_TRY_GET(given, read_kitti_trajectory(*options.trajectory));
+    given.resize(std::min(given.size(), static_cast<std::size_t>(options.num_frames)));
+  }
+  synth::Drive drive = options.trajectory ? synth::make_drive_along(given)
+                                          : synth::make_own_drive(options.num_frames, options.seed,
+                                                                  options.render.traffic);
   if (options.render.visit > 0) {
     synth::drive_again(options.seed, options.render.visit, drive);
   }
@@ -63,13 +61,10 @@ struct DriveFolder {  // OUT/sequences/NAME and OUT/poses/NAME.txt
 Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
                                            const SyntheticDriveOptions& options) {
   std::error_code code;
-  const bool is_input =
-      options.trajectory && fs::equivalent(*options.trajectory, drive.poses, code);
-  if (is_input ||
-      (fs::exists(drive.poses, code) && !pipeline::is_folder_of(drive.sequence, "synth"))) {
+  if (fs::exists(drive.poses, code) && !pipeline::is_folder_of(drive.sequence, "synth")) {
     return fail(fmt::format(
-        "{}: expected poses of a rendered drive or none, found {} (--name gives another name)",
-        drive.poses.string(), is_input ? "the given trajectory" : "others"));
+        "{}: expected poses of a rendered drive or none, found others (--name gives another name)",
+        drive.poses.string()));
   }
   STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(drive.sequence, "synth", {}));
   for (const char* content : {"image_2", "depth", "moving", "times.txt"}) {
@@ -124,7 +119,7 @@ Status render_frames(const synth::Renderer& renderer,
 }
 
 /// calib.txt with the same intrinsics in P0 to P3, no baseline; the poses, moved so that the first
-/// one is the identity, with 17 digits; times.txt.
+/// one is the identity; times.txt.
 Status write_texts(const DriveFolder& drive,
                    const Camera& camera,
                    std::span<const Rigid3> world_from_camera,
@@ -136,19 +131,12 @@ Status write_texts(const DriveFolder& drive,
   }
   const int digits = rate_hz == 10.0 ? 6 : 12;  // KITTI's own number of digits where it is exact
   std::string times;
-  std::string poses;
   for (std::size_t i = 0; i < world_from_camera.size(); ++i) {
     times += fmt::format("{:.{}e}\n", static_cast<double>(i) / rate_hz, digits);
-    const Matrix34d m = i == 0
-                            ? Rigid3().matrix()
-                            : (world_from_camera.front().inverse() * world_from_camera[i]).matrix();
-    for (int k = 0; k < 12; ++k) {
-      poses += fmt::format("{:.16e}{}", m(k / 4, k % 4), k == 11 ? '\n' : ' ');
-    }
   }
-  return write_text_file(drive.sequence / "calib.txt", calibration)
-      .and_then([&] { return write_text_file(drive.poses, poses); })
-      .and_then([&] { return write_text_file(drive.sequence / "times.txt", times); });
+  STEMVO_TRY(write_text_file(drive.sequence / "calib.txt", calibration));
+  STEMVO_TRY(write_kitti_trajectory(drive.poses, relative_to_first(world_from_camera)));
+  return write_text_file(drive.sequence / "times.txt", times);
 }
 
 }  // namespace

@@ -53,6 +53,15 @@ void add_value_noise(std::uint64_t seed,
   }
 }
 
+/// Sum of value noise over octaves: `amplitudes[k]` at a wavelength of 2^k texels.
+std::vector<float> octave_noise(std::uint64_t seed, const std::vector<double>& amplitudes) {
+  std::vector<float> values(kSize * kSize, 0.0F);
+  for (std::size_t octave = 0; octave < amplitudes.size(); ++octave) {
+    add_value_noise(hash_of(seed, octave), kSize >> octave, amplitudes[octave], values);
+  }
+  return values;
+}
+
 std::vector<float> leaf_noise(std::uint64_t seed) {
   auto values = octave_noise(seed, {0.6, 1.0, 1.2, 1.1, 0.9, 0.7, 0.4});
   normalize(values);
@@ -112,14 +121,6 @@ Rgb sky_colour(const Vec3& direction, double pixel_rad, const Textures& textures
   // Fields from just below the horizon on.
   const Rgb field = {0.37F * shade, 0.39F * shade, 0.27F * shade};
   return blend(colour, field, 1.0F - smooth_step(-0.03F, -0.005F, elevation));
-}
-
-std::vector<float> octave_noise(std::uint64_t seed, const std::vector<double>& amplitudes) {
-  std::vector<float> values(kSize * kSize, 0.0F);
-  for (std::size_t octave = 0; octave < amplitudes.size(); ++octave) {
-    add_value_noise(hash_of(seed, octave), kSize >> octave, amplitudes[octave], values);
-  }
-  return values;
 }
 
 Ripmap::Ripmap(std::vector<float> values) {

@@ -15,16 +15,6 @@ constexpr double kSeenBehind_m = 25.0;
 constexpr double kSeenAhead_m = 170.0;
 constexpr double kMoving_m_s = 0.02;
 
-std::vector<double> exact_arcs(const Drive& drive) {
-  std::vector<double> arcs_m;
-  for (std::size_t i = 0; i < drive.arcs_m.size(); ++i) {
-    const RoadFrame road = drive.road.at(drive.arcs_m[i]);
-    const Vec3 offset = drive.world_from_camera[i].translation - road.position;
-    arcs_m.push_back(drive.arcs_m[i] + offset.dot(road.forward));
-  }
-  return arcs_m;
-}
-
 std::vector<double> calm(const std::vector<double>& arcs_m) {
   constexpr std::ptrdiff_t kReach = 7;
   std::vector<double> result;
@@ -63,8 +53,12 @@ struct Lead {
 
 class TrafficPlan {
  public:
-  TrafficPlan(const Drive& drive, std::uint64_t seed)
-      : road_(drive.road), seed_(seed), arcs_m_(exact_arcs(drive)) {
+  TrafficPlan(const Drive& drive, std::uint64_t seed) : road_(drive.road), seed_(seed) {
+    for (std::size_t i = 0; i < drive.arcs_m.size(); ++i) {
+      const RoadFrame road = road_.at(drive.arcs_m[i]);
+      const Vec3 offset = drive.world_from_camera[i].translation - road.position;
+      arcs_m_.push_back(drive.arcs_m[i] + offset.dot(road.forward));
+    }
     find_stands();
     arcs_m_ = calm(arcs_m_);
     plan_leads();
@@ -119,8 +113,7 @@ class TrafficPlan {
         const int middle = stand.is_behind_lead ? behind_lead : first;
         if (has_room(middle)) {
           stand.crossing = middle;
-          const auto part = std::ranges::upper_bound(road_.parts(), middle, {}, &RoadPart::end);
-          crossings_.push_back(middle - part->shift);
+          crossings_.push_back(middle - road_.part_of(middle).shift);
         }
         stands_.push_back(stand);
       }
@@ -158,12 +151,6 @@ class TrafficPlan {
     return (1.0 - t) * arcs_m_[i] + t * arcs_m_[std::min(i + 1, arcs_m_.size() - 1)];
   }
 
-  [[nodiscard]] double camera_speed_m_s(double time_s) const {
-    constexpr double kSpan_s = 0.5;
-    const double from_s = std::max(0.0, time_s - kSpan_s);
-    return (camera_arc_m(time_s + kSpan_s) - camera_arc_m(from_s)) / (time_s + kSpan_s - from_s);
-  }
-
   [[nodiscard]] double lead_arc_m(const Lead& lead, double time_s) const {
     constexpr double kFar_m = 165.0;  // nothing is seen there
     constexpr double kApproach_s = 30.0;
@@ -180,7 +167,10 @@ class TrafficPlan {
     gap_m *= 1.0 + 0.2 * std::sin(0.08 * arc_m);
     arc_m += gap_m;
     if (time_s > lead.leave_s) {
-      const double begin_m_s = std::clamp(camera_speed_m_s(lead.leave_s), 0.0, kFast_m_s);
+      const double from_s = std::max(0.0, lead.leave_s - 0.5);
+      const double to_s = lead.leave_s + 0.5;
+      const double camera_m_s = (camera_arc_m(to_s) - camera_arc_m(from_s)) / (to_s - from_s);
+      const double begin_m_s = std::clamp(camera_m_s, 0.0, kFast_m_s);
       const double speed_up_s =
           std::min(time_s - lead.leave_s, (kFast_m_s - begin_m_s) / kFaster_m_s2);
       arc_m += begin_m_s * (time_s - lead.leave_s) + 0.5 * kFaster_m_s2 * speed_up_s * speed_up_s +

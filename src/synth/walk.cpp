@@ -310,8 +310,7 @@ struct Hand {
 }  // namespace
 
 Walk make_walk(int num_frames, std::uint64_t seed, const RenderOptions& options) {
-  Walk walk;
-  walk.courtyard = lay_courtyard(seed);
+  Walk walk{{}, lay_courtyard(seed)};
   walk.courtyard.has_blank_walls = options.blank_walls;
   const double duration_s = num_frames / options.walk_rate_hz;
   const WalkPlan plan(walk.courtyard, options, duration_s,

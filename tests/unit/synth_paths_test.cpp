@@ -118,9 +118,9 @@ TEST(Walk, TurnsAsFastAsAsked) {
 TEST(Walk, MayBeBetweenBlankWalls) {
   const auto faces = [](bool is_blank) {
     const Walk walk = make_walk(2, 1, {.blank_walls = is_blank});
-    Scene scene(walk.world_from_camera[0].translation, Eigen::Vector3d(0.0, -1.0, 0.0), 0.5);
+    Scene scene{walk.world_from_camera[0].translation, Eigen::Vector3d(0.0, -1.0, 0.0), 0.5};
     add_courtyard(walk.courtyard, scene);
-    return scene.faces();
+    return scene.faces;
   };
   double plain_m2 = 0.0;  // of large upright faces of one colour
   for (const Face& face : faces(true)) {

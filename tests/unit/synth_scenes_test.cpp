@@ -31,10 +31,10 @@ Trajectory round_a_block() {
 
 /// Faces within 30 m of `here` in the scene of one frame.
 std::set<std::array<long, 10>> faces_near(const Drive& drive, std::size_t frame, const Vec3& here) {
-  Scene scene(here, -Vec3::UnitY(), 0.5);
+  Scene scene{here, -Vec3::UnitY(), 0.5};
   add_street(drive.road, drive.arcs_m[frame], 1, scene);
   std::set<std::array<long, 10>> faces;
-  for (const Face& face : scene.faces()) {
+  for (const Face& face : scene.faces) {
     std::array<long, 10> key{};
     bool is_near = true;
     for (std::size_t i = 0; i < 3; ++i) {
