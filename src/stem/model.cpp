@@ -62,7 +62,7 @@ class InfoReader {
  private:
   /// "": there is none.
   [[nodiscard]] std::string value_of(const std::string& key) const {
-    return session_.metadata("stemvo." + key).value_or(std::nullopt).value_or("");
+    return session_.metadata("stemvo." + key).value_or("");
   }
 
   std::string text(const char* key) {
