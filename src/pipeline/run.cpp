@@ -175,7 +175,7 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   if (request.num_threads > 0) {
     resolved.config.threads = request.num_threads;
   }
-  const pipeline::ThreadScope scope(resolved.config.threads);
+  const auto limit = pipeline::limit_threads(resolved.config.threads);
   STEMVO_TRY_GET(const auto sequence, open_sequence(resolved));
   return run_source(std::move(resolved), sequence, progress);
 }
