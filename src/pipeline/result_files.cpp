@@ -101,9 +101,8 @@ class ResultWriter {
   /// All but metrics.json and report.html.
   [[nodiscard]] Status write(MetricsReport& report) {
     const std::filesystem::path& folder = request_.out_dir;
-    Status written = write_poses("trajectory", trajectory_);
+    Status written = drive_.written;
     report = make_report();
-    keep_first(written, drive_.written);
     if (truth_) {
       csv_ = frames_csv_with_errors(drive_.csv, frame_errors(report));
       keep_first(written, write_text_file(folder / "frames.csv", csv_));
@@ -148,16 +147,6 @@ class ResultWriter {
     return GroundTruth{relative_to_first(std::span(truth.poses).subspan(skipped)),
                        {first, truth.frames.end()}};
   }
-  [[nodiscard]] Status write_poses(const std::string& name, const Trajectory& poses) const {
-    const std::filesystem::path& folder = request_.out_dir;
-    std::vector<double> times_s;
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      times_s.push_back(sequence_.time_s(i));
-    }
-    Status written = write_kitti_trajectory(folder / (name + "_kitti.txt"), poses);
-    keep_first(written, write_tum_trajectory(folder / (name + "_tum.txt"), times_s, poses));
-    return written;
-  }
 
   [[nodiscard]] Status write_map(MetricsReport& report) {
     map_ = finish_map(run_);
@@ -165,7 +154,14 @@ class ResultWriter {
     if (!request_.config.odometry.loops) {
       return written;
     }
-    keep_first(written, write_poses("trajectory_map", map_->trajectory));
+    const std::filesystem::path& folder = request_.out_dir;
+    const Trajectory& poses = map_->trajectory;
+    std::vector<double> times_s;
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      times_s.push_back(sequence_.time_s(i));
+    }
+    keep_first(written, write_kitti_trajectory(folder / "trajectory_map_kitti.txt", poses));
+    keep_first(written, write_tum_trajectory(folder / "trajectory_map_tum.txt", times_s, poses));
     if (request_.saved_map) {
       keep_first(written, run_.odometry.save_map(*request_.saved_map, map_->whole));
     }

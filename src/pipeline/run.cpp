@@ -27,22 +27,12 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   FrameSourceRequest source = request;
   source.camera = request.config.input.camera;
   auto sequence = open_source(source);
-  if (!sequence || request.config.scale_choice != ScaleChoice::kGroundTruth) {
-    return sequence;
-  }
-  if (!sequence->has_ground_truth()) {
-    const auto file = sequence->is_kitti
-                          ? request.sequence_dir / "../../poses" / (sequence->name + ".txt")
-                          : request.sequence_dir;
+  if (sequence && request.config.scale_choice == ScaleChoice::kGroundTruth &&
+      !(sequence->ground_truth && sequence->ground_truth->frames.size() == sequence->size())) {
     return fail(fmt::format(
-        "{}: expected a pose file, which scale.source=ground_truth needs, found none (see --gt)",
-        file.lexically_normal().string()));
-  }
-  if (sequence->stream || sequence->ground_truth->frames.size() < sequence->size()) {
-    return fail(fmt::format(
-        "{}: expected a true pose of every frame, which scale.source=ground_truth needs, found {}",
-        sequence->ground_truth_file->string(),
-        sequence->stream ? "a stream, whose times are not known before" : "some only"));
+        "{}: expected a true pose of every frame (see --gt), which scale.source=ground_truth "
+        "needs, found none, some only or a stream, whose times are not known before",
+        request.sequence_dir.string()));
   }
   return sequence;
 }
