@@ -133,6 +133,17 @@ std::optional<LightChange> light_change(const cv::Mat& before,
   return is_agreed ? std::optional(light) : std::nullopt;
 }
 
+/// Input pixels per pixel of the image made from a channel of `sampling_px`.
+int image_sampling_px(TrackingResolution resolution, int sampling_px) {
+  if (resolution == TrackingResolution::kNative) {
+    return sampling_px;
+  }
+  if (resolution == TrackingResolution::kHalf) {
+    return sampling_px == 1 || sampling_px % 2 == 0 ? 2 : sampling_px;
+  }
+  return 1;
+}
+
 }  // namespace
 
 ContrastNormalization::ContrastNormalization(const StemOptions& options) : options_(options) {}
@@ -215,16 +226,6 @@ TrackingResolution choose_tracking_resolution(TrackingResolution asked,
   }
   return camera.mean_focal_px() >= kLongFocal_px ? TrackingResolution::kHalf
                                                  : TrackingResolution::kInputZoomed;
-}
-
-int image_sampling_px(TrackingResolution resolution, int sampling_px) {
-  if (resolution == TrackingResolution::kNative) {
-    return sampling_px;
-  }
-  if (resolution == TrackingResolution::kHalf) {
-    return sampling_px == 1 || sampling_px % 2 == 0 ? 2 : sampling_px;
-  }
-  return 1;
 }
 
 }  // namespace stemvo

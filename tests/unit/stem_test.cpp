@@ -165,14 +165,14 @@ TEST(StemErrors, FilterAndSamplingNameTheAllowedValues) {
   EXPECT_EQ(error_of(plain, -2), "stem.filter: expected 0 to 2 for " + plain + ", found -2");
   EXPECT_EQ(error_of("gray", 1), "stem.filter: expected 0 to 0 for gray, found 1");
   EXPECT_EQ(error_of("input_layer", 3), "stem.filter: expected 0 to 2 for input_layer, found 3");
-  const std::string divisors = "stem.sampling_px: expected 1, 2, 4 (divisors of the stride 4)";
+  const std::string divisors = "stem.sampling_px: expected the model's stride 4 or a divisor of it";
   for (const int sampling : {3, 8, -1}) {
     EXPECT_EQ(error_of(plain, 0, sampling), divisors + ", found " + std::to_string(sampling));
   }
   EXPECT_EQ(error_of("gray", 0, 2),
-            "stem.sampling_px: expected 1 (divisors of the stride 1), found 2");
+            "stem.sampling_px: expected the model's stride 1 or a divisor of it, found 2");
   EXPECT_EQ(error_of(tiny_model("deep_k12s4"), 0, 2),
-            "stem.sampling_px: expected 4 (the model allows its stride only, 4), found 2");
+            "stem.sampling_px: expected the model's stride 4, found 2");
 }
 
 TEST(StemErrors, SmallFramesAndFixedSizes) {
