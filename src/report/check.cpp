@@ -160,14 +160,8 @@ std::string xml(const std::string& text) {
   return escaped;
 }
 
-/// Six digits, or all of them where six would show a passed bound as kept.
 std::string shown(const ThresholdResult& result) {
-  if (!result.number) {
-    return "null";
-  }
-  const std::string rounded = fmt::format("{:.6g}", *result.number);
-  return rounded == fmt::format("{:.6g}", result.limit) ? fmt::format("{}", *result.number)
-                                                        : rounded;
+  return result.number ? fmt::format("{:.9g}", *result.number) : "null";
 }
 
 }  // namespace
