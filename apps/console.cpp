@@ -10,7 +10,6 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <signal.h>
 #include <unistd.h>
 
 #include "commands.hpp"
@@ -34,7 +33,10 @@ void print_labelled(std::string line, std::string_view message) {
 std::atomic<bool> interrupted = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-void on_signal(int /*number*/) { interrupted = true; }
+void on_signal(int number) {
+  interrupted = true;
+  std::signal(number, SIG_DFL);
+}
 
 }  // namespace
 
@@ -104,23 +106,15 @@ std::chrono::steady_clock::time_point process_start() {
 }
 
 void catch_interrupts() {
-  struct sigaction action = {};
-  action.sa_handler = on_signal;
-  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
-  sigemptyset(&action.sa_mask);
   for (const int number : {SIGINT, SIGTERM}) {
-    sigaction(number, &action, nullptr);
+    std::signal(number, on_signal);
   }
 }
 
 bool is_interrupted() { return interrupted; }
 
 Progress::Progress(std::string unit, bool is_quiet)
-    : unit_(std::move(unit)),
-      is_quiet_(is_quiet),
-      is_terminal_(::isatty(STDERR_FILENO) == 1),
-      start_(Clock::now()),
-      last_(start_) {}
+    : unit_(std::move(unit)), is_quiet_(is_quiet), is_terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 bool Progress::operator()(std::size_t done, std::size_t total) {
   const bool go_on = !is_interrupted();

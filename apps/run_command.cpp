@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <atomic>
 #include <string>
 #include <vector>
@@ -134,9 +135,7 @@ Expected<int> run(RunArguments& arguments) {
     return progress(done, total) && is_read;
   };
   STEMVO_TRY_GET(const RunSummary summary, run_sequence(request, go_on));
-  for (const std::string& warning : summary.warnings) {
-    print_warning(warning);
-  }
+  std::ranges::for_each(summary.warnings, print_warning);
   if (summary.interrupted) {
     print_warning(fmt::format("interrupted; the results hold the first {} frames",
                               summary.report.num_frames));
