@@ -124,7 +124,12 @@ class ResultWriter {
     const TrajectoryPlot plot = make_plot(report);
     std::optional<MapPage> map;
     if (map_ && report.map) {
-      map = {in_truth(map_->trajectory, report), loops_of(map_->whole.kept)};
+      map = {in_truth(map_->trajectory, report), {}};
+      for (const auto& [from, to] : frames_of_loops(map_->whole.kept)) {
+        if (from >= 0) {  // else of another recording's map
+          map->loops.emplace_back(from, to);
+        }
+      }
     }
     return write_run_page(request_.out_dir / "report.html",
                           {plot, report, csv_, map, truth_, drive_.images,
@@ -188,7 +193,6 @@ class ResultWriter {
         std::chrono::steady_clock::now() - request_.started;
     const Config& config = request_.config;
     MetricsReport report;
-    report.stemvo_version = version();
     report.sequence = sequence_.name;
     report.first_frame = sequence_.range.begin;
     report.num_frames = trajectory_.size();
