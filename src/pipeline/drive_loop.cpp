@@ -46,7 +46,7 @@ std::size_t expected_frames(const FrameSource& sequence, std::size_t num_done) {
 class DriveLoop {
  public:
   DriveLoop(const Run& run, const RunProgress& progress) : run_(run), progress_(progress) {
-    drive_.csv = frames_csv_header();
+    drive_.csv = kFramesCsvHeader;
     append(rows_, drive_.csv);
   }
 
