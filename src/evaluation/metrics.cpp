@@ -10,9 +10,8 @@
 namespace stemvo {
 namespace {
 
-constexpr std::size_t kFirstFrameStep = 10;  // devkit: every 10th frame starts a segment
-constexpr double kDenseShare = 1.0 / 8.0;    // of the path
-constexpr double kShortPath_m = 100.0;       // below it no devkit segment fits
+constexpr double kDenseShare = 1.0 / 8.0;  // of the path
+constexpr double kShortPath_m = 100.0;     // below it no devkit segment fits
 
 std::vector<Eigen::Vector3d> positions(std::span<const Rigid3> poses) {
   std::vector<Eigen::Vector3d> result(poses.size());

@@ -2,6 +2,7 @@
 #include "pipeline/result_files.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <span>
 
 #include <fmt/format.h>
@@ -43,6 +44,10 @@ std::string describe_frames(const FrameSource& sequence, std::size_t num_frames)
   const std::string end = num_frames > 0 ? std::to_string(begin + num_frames) : "";
   // A line break in a name must not end the comment it stands in.
   return one_line(fmt::format("frames {}:{} of {}", begin, end, sequence.name));
+}
+
+bool is_scale_measured(const FrameResult& frame) {
+  return frame.scale_state == ScaleState::kMeasured;
 }
 
 template <typename Predicate>
@@ -200,35 +205,25 @@ class ResultWriter {
     report.filter = run_.odometry.stem_info().filter;
     report.fps = static_cast<double>(trajectory_.size()) / std::max(elapsed.count(), 1e-9);
     report.scale_source = scale_source(config);
-    if (has_speeds()) {
+    if (!run_.beside.ways.empty() && std::ranges::any_of(drive_.frames, is_scale_measured)) {
       report.scale_source =
           config.scale.source == ScaleSource::kNone ? "speed" : report.scale_source + " and speed";
     }
-    report.tracked_fraction =
-        share_of(drive_.frames, [](const FrameResult& frame) { return frame.is_measured; });
+    report.tracked_fraction = share_of(drive_.frames, std::mem_fn(&FrameResult::is_measured));
     add_maps(drive_.frames, report);
     report.in_place_fraction = share_in_place(drive_.frames);
     const FrameResult& last = drive_.frames.back();
     report.camera = {last.camera, last.camera_sigma, last.radial};
     if (config.scale.source == ScaleSource::kCameraHeight) {
-      report.road_measured_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
-        return frame.scale_state == ScaleState::kMeasured;
-      });
+      report.road_measured_fraction = share_of(drive_.frames, is_scale_measured);
       report.road_believed_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
-        return frame.scale_state == ScaleState::kMeasured || frame.scale_state == ScaleState::kHeld;
+        return is_scale_measured(frame) || frame.scale_state == ScaleState::kHeld;
       });
     }
     if (truth_) {
       report.metrics = metrics_of(trajectory_, report);
     }
     return report;
-  }
-
-  [[nodiscard]] bool has_speeds() const {
-    return !run_.beside.ways.empty() &&
-           std::ranges::any_of(drive_.frames, [](const FrameResult& frame) {
-             return frame.scale_state == ScaleState::kMeasured;
-           });
   }
 
   [[nodiscard]] TrajectoryPlot make_plot(const MetricsReport& report) const {
