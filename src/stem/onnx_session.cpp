@@ -89,7 +89,6 @@ Status OnnxSession::load(std::string_view model) {
   }
   // ONNX Runtime would send telemetry, and keep a file for it in the user's cache.
   ::setenv("ORT_DISABLE_TELEMETRY", "1", 0);
-  STEMVO_ORT_TRY(api_->GetAllocatorWithDefaultOptions(&allocator_));
   // Fatal only: whatever goes wrong comes back as a status, and must not be printed twice.
   STEMVO_TRY_GET(env_, make(api_->ReleaseEnv, api_->CreateEnv, ORT_LOGGING_LEVEL_FATAL, "stemvo"));
   STEMVO_TRY_GET(memory_, make(api_->ReleaseMemoryInfo, api_->CreateCpuMemoryInfo,
@@ -105,6 +104,7 @@ Status OnnxSession::load(std::string_view model) {
   STEMVO_ORT_TRY(api_->AddSessionConfigEntry(options.get(), kFolderOfWeights, "/none"));
   STEMVO_TRY_GET(session_, make(api_->ReleaseSession, api_->CreateSessionFromArray, env_.get(),
                                 model.data(), model.size(), options.get()));
+  STEMVO_ORT_TRY(api_->GetAllocatorWithDefaultOptions(&allocator_));
   return {};
 }
 
