@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <signal.h>
 #include <unistd.h>
 
 #include "commands.hpp"
@@ -33,10 +34,7 @@ void print_labelled(std::string line, std::string_view message) {
 std::atomic<bool> interrupted = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-void on_signal(int number) {
-  interrupted = true;
-  std::signal(number, SIG_DFL);
-}
+void on_signal(int /*number*/) { interrupted = true; }
 
 }  // namespace
 
@@ -106,8 +104,12 @@ std::chrono::steady_clock::time_point process_start() {
 }
 
 void catch_interrupts() {
+  struct sigaction action = {};
+  action.sa_handler = on_signal;
+  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
+  sigemptyset(&action.sa_mask);
   for (const int number : {SIGINT, SIGTERM}) {
-    std::signal(number, on_signal);
+    sigaction(number, &action, nullptr);
   }
 }
 

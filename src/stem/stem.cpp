@@ -60,12 +60,8 @@ Expected<std::vector<Channel>> apply_enlarged(
   }
   cv::Mat enlarged;
   cv::resize(frame, enlarged, {}, zoom, zoom, cv::INTER_CUBIC);
-  auto channels = bank(enlarged, first, last);
-  if (!channels) {
-    return fail(fmt::format("{} (a frame of {}x{} enlarged {} times)", channels.error().message,
-                            frame.cols, frame.rows, zoom));
-  }
-  for (Channel& channel : *channels) {
+  STEMVO_TRY_GET(auto channels, bank(enlarged, first, last));
+  for (Channel& channel : channels) {
     channel.map.scale /= zoom;
     channel.map.offset_px = ((channel.map.offset_px.array() + 0.5) / zoom - 0.5).matrix();
   }

@@ -183,7 +183,7 @@ TEST(StemErrors, SmallFramesAndFixedSizes) {
               HasSubstr("expected frames of at least 4x4, found 9x3"));
   EXPECT_EQ(stem.frame_zoom(TrackingResolution::kInputZoomed), 2);
   EXPECT_THAT(stem.apply(cv::Mat1b(1, 9, 1), 2).error().message,
-              AllOf(HasSubstr("at least 4x4, found 18x2"), HasSubstr("a frame of 9x1 enlarged")));
+              HasSubstr("at least 4x4, found 18x2"));
   const Stem fixed = make_stem(kFixed4, 2);
   EXPECT_EQ(fixed.frame_zoom(TrackingResolution::kInputZoomed), 1);
   EXPECT_EQ(fixed.apply(cv::Mat1b(32, 48, 1))->values.size(), cv::Size(23, 15));
