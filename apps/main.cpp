@@ -6,8 +6,11 @@
 #include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <opencv2/core/utils/logger.hpp>
 
 #include "commands.hpp"
@@ -50,6 +53,15 @@ class HelpFormat : public CLI::Formatter {
   }
 };
 
+/// "expected a command: run, evaluate, .., found 'runn'"
+std::string expected_command(const CLI::App& app, const std::string& found) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    names.push_back(command->get_name());
+  }
+  return fmt::format("expected a command: {}, found {}", fmt::join(names, ", "), found);
+}
+
 bool is_image(const std::string& word) {
   return word.ends_with(".png") || word.ends_with(".jpg") || word.ends_with(".jpeg");
 }
@@ -62,10 +74,20 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
     print_help(help.str());
     return kExitDone;
   }
-  const auto commands = app.get_subcommands();
-  const std::string command =
-      commands.empty() ? "stemvo" : "stemvo " + commands.front()->get_name();
-  std::string message = one_line(error.what());  // a pattern may have become a thousand names
+  std::string command = "stemvo";
+  for (const CLI::App* sub : app.get_subcommands()) {
+    command += " " + sub->get_name();
+  }
+  std::string message = error.what();
+  if (app.get_subcommands().empty()) {
+    const std::vector<std::string> words = app.remaining();
+    const auto word =
+        std::ranges::find_if(words, [](const std::string& one) { return !one.starts_with('-'); });
+    if (word != words.end()) {
+      message = expected_command(app, "'" + *word + "'");
+    }
+  }
+  message = one_line(message);  // the shell may have made a thousand names of a pattern
   if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr &&
       std::ranges::any_of(app.remaining(true), is_image)) {
     message += "; a pattern of files must be quoted";
@@ -107,7 +129,7 @@ int run_program(int argc, char** argv) {
     return report_usage(app, error);
   }
   if (!action) {
-    print_error("expected a command (see 'stemvo --help')");
+    print_error(expected_command(app, "none") + " (see 'stemvo --help')");
     return kExitUsage;
   }
   const Expected<int> exit_code = action();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "options.hpp"
 
+#include <map>
 #include <system_error>
 #include <type_traits>
 
@@ -82,7 +83,14 @@ Expected<Config> read_config(const ConfigArguments& arguments, const Config& bas
     STEMVO_TRY_GET(const auto file, find_config(arguments.file));
     STEMVO_TRY_GET(config, load_config(file, base));
   }
+  std::map<std::string, std::string> given;  // key -> the assignment
   for (const std::string& assignment : arguments.overrides) {
+    const auto [before, is_new] =
+        given.emplace(assignment.substr(0, assignment.find('=')), assignment);
+    if (!is_new) {
+      return fail("--set " + before->first + ": expected once, found '" + before->second +
+                  "' and '" + assignment + "'");
+    }
     STEMVO_TRY(apply_override(config, assignment));
   }
   STEMVO_TRY(validate(config));

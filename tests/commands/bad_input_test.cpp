@@ -43,6 +43,8 @@ TEST_F(BadInput, PosesBehindALinkToNowhere) {
 TEST_F(BadInput, Configuration) {
   expect_error(run({"--config", "nope"}), 1, {"nope: expected", "default, fast, paper", "neither"});
   expect_error(run({"--config", folder_.path().string()}), 1, {"found a folder"});
+  expect_error(run({"--set", "stem.filter=3", "--set", "seed=2", "--set", "stem.filter=4"}), 1,
+               {"--set stem.filter: expected once", "'stem.filter=3'", "'stem.filter=4'"});
   expect_error(run({"--map", folder_ / "poses/00.txt"}), 1,
                {"00.txt: expected a map of stemvo, found another kind of file"});
 }

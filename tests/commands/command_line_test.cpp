@@ -59,7 +59,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"check", "metrics.json"}, "--against"},
       {{"check", "m", "--baseline", "b", "--tolerance", "200%"}, "0% to 100%, found 200%"},
       {{"check", "m", "--baseline", "b", "--tolerance", "5%%"}, "found 5%%"},
-      {{"runn", "x", "--out", "o"}, "runn"},
+      {{"runn", "x", "--out", "o"}, "models, found 'runn'"},
   };
   for (const Misuse& misuse : cases) {
     const ProgramResult result = run_stemvo(misuse.arguments);
