@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <fstream>
@@ -35,6 +36,12 @@ std::atomic<bool> interrupted = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
 
 void on_signal(int /*number*/) { interrupted = true; }
+
+std::string describe_time(double seconds) {
+  const auto whole = std::lround(seconds);
+  return whole < 60 ? fmt::format("{} s", whole)
+                    : fmt::format("{} min {:02} s", whole / 60, whole % 60);
+}
 
 }  // namespace
 
@@ -137,10 +144,10 @@ std::string Progress::line(std::size_t done,
                            bool is_last) const {
   const double per_s = static_cast<double>(done) / std::max(elapsed_s, 1e-9);
   const std::string of = total == 0 ? "" : fmt::format("/{}", total);
-  const std::string time =
-      is_last || total == 0
-          ? fmt::format("{:.0f} s", elapsed_s)
-          : fmt::format("{:.0f} s left", static_cast<double>(total - done) / per_s);
+  const std::string time = is_last ? describe_time(elapsed_s) + " in all"
+                           : total == 0
+                               ? describe_time(elapsed_s) + " so far"
+                               : describe_time(static_cast<double>(total - done) / per_s) + " left";
   const std::string text =
       fmt::format("{}{} {}, {:.1f} {}/s, {}", done, of, unit_, per_s, unit_, time);
   // \r and "erase to the end" keep a terminal's cursor on one line until the last.

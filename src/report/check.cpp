@@ -160,8 +160,14 @@ std::string xml(const std::string& text) {
   return escaped;
 }
 
+/// Six digits, or all of them where six would show a passed bound as kept.
 std::string shown(const ThresholdResult& result) {
-  return result.number ? fmt::format("{:.9g}", *result.number) : "null";
+  if (!result.number) {
+    return "null";
+  }
+  const std::string rounded = fmt::format("{:.6g}", *result.number);
+  return rounded == fmt::format("{:.6g}", result.limit) ? fmt::format("{}", *result.number)
+                                                        : rounded;
 }
 
 }  // namespace

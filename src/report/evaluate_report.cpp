@@ -97,10 +97,13 @@ void cut(PoseFile& file, const FrameRange& range) {
   }
 }
 
-Expected<Pairs> pair_poses(const PoseFile& estimate, const PoseFile& truth, double tolerance_s) {
+/// Nullopt: all of both, line by line.
+Expected<std::optional<Pairs>> pair_poses(const PoseFile& estimate,
+                                          const PoseFile& truth,
+                                          double tolerance_s) {
   if (estimate.timestamps_s.empty() || truth.timestamps_s.empty()) {
     if (estimate.poses.size() == truth.poses.size()) {
-      return Pairs{estimate.poses, truth.poses};
+      return std::nullopt;
     }
     return fail(fmt::format(
         "{}: expected {} poses as in {}, found {} (poses are compared line by line "
@@ -149,7 +152,8 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
       cut(estimate, range);
     }
     STEMVO_TRY_GET(const auto pairs, pair_poses(estimate, truth, request.tolerance_s));
-    const auto& [compared, with] = pairs;
+    const Trajectory& compared = pairs ? pairs->estimate : estimate.poses;
+    const Trajectory& with = pairs ? pairs->truth : truth.poses;
     if (compared.size() < 2) {
       return fail(file.string() + ": expected at least 2 poses, for motions are compared, found 1");
     }
@@ -172,6 +176,17 @@ std::string format_evaluation_table(const EvaluationReport& report) {
     add_row(table, row, report.alignment);
   }
   add_row(table, report.zero_motion, Alignment::kNone);
+  const auto [least, most] = std::ranges::minmax(
+      report.rows, {}, [](const EvaluationRow& row) { return row.metrics.num_segments; });
+  const int few = least.metrics.num_segments;
+  const int many = most.metrics.num_segments;
+  const std::string segments =
+      many == 0
+          ? fmt::format("no segment of {} fits into the drive: no t_rel and r_rel",
+                        length_range(least.metrics.segment_lengths_m))
+          : fmt::format("t_rel and r_rel: mean over {} segments of {}",
+                        few == many ? std::to_string(few) : fmt::format("{} to {}", few, many),
+                        length_range(least.metrics.segment_lengths_m));
   std::string notes;
   for (const EvaluationRow& row : report.rows) {
     if (row.num_pairs < row.num_poses) {
@@ -187,12 +202,11 @@ std::string format_evaluation_table(const EvaluationReport& report) {
     }
   }
   return fmt::format(
-      "ground truth  {}, {} poses, {:.1f} m\nalignment     {} (the last row: none)\n\n{}\n"
-      "t_rel and r_rel: mean over segments of {}, as far as they fit into the drive\n"
+      "ground truth  {}, {} poses, {:.1f} m\nalignment     {} (the last row: none)\n\n{}\n{}\n"
       "offset: mean of |dx| + |dz|; ATE: root mean square position error; RPE: mean error of "
       "the step of one frame\n{}",
       report.ground_truth, report.num_poses, zero_motion.path_length_m, to_string(report.alignment),
-      table.str(), length_range(zero_motion.segment_lengths_m), notes);
+      table.str(), segments, notes);
 }
 
 nlohmann::ordered_json evaluation_document(const EvaluationReport& report) {

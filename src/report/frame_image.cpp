@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "internal_check.hpp"
 #include "io/image_file.hpp"
 #include "io/png.hpp"
 #include "text/text_file.hpp"
@@ -31,6 +32,7 @@ const cv::Scalar kPaper(255, 255, 255);
 const cv::Scalar kInk(34, 34, 34);
 
 cv::Mat to_rgb(const cv::Mat& image) {
+  STEMVO_CHECK(image.type() == CV_8UC1 || image.type() == CV_8UC3, "8-bit gray or RGB");
   cv::Mat rgb = image.clone();
   if (image.channels() == 1) {
     cv::cvtColor(image, rgb, cv::COLOR_GRAY2RGB);
@@ -136,6 +138,9 @@ cv::Mat draw_frame_image(const cv::Mat& frame,
                          const ChannelImage& channel,
                          const Matches& matches,
                          const std::vector<char>& inlier_mask) {
+  STEMVO_CHECK(matches.prev_uv.size() == matches.cur_uv.size(), "matches come in pairs");
+  STEMVO_CHECK(inlier_mask.empty() || inlier_mask.size() == matches.cur_uv.size(),
+               "one entry per match");
   const int width_px = !frame.empty()            ? frame.cols
                        : !channel.pixels.empty() ? channel.pixels.cols
                                                  : kDefaultWidth_px;
@@ -182,6 +187,7 @@ cv::Mat draw_under_caption(const cv::Mat& image,
 }
 
 cv::Mat draw_sheet(const std::vector<cv::Mat>& images, const std::vector<std::string>& captions) {
+  STEMVO_CHECK(!images.empty() && images.size() == captions.size(), "one caption per image");
   const cv::Size full = images.front().size();
   const auto count = static_cast<double>(images.size());
   // The number that brings the sheet nearest to its aspect.
@@ -208,8 +214,13 @@ cv::Mat draw_sheet(const std::vector<cv::Mat>& images, const std::vector<std::st
 
 std::string encode_jpeg(const cv::Mat& image, int width) {
   constexpr int kQuality = 80;
-  const int width_px = std::min(width, image.cols);
-  return io::encode_jpeg(fit(image, {width_px, height_at_width(image, width_px)}), kQuality);
+  if (image.cols <= width) {
+    return io::encode_jpeg(image, kQuality);
+  }
+  const int height = std::max(1, cvRound(image.rows * (1.0 * width / image.cols)));
+  cv::Mat smaller;
+  cv::resize(image, smaller, {width, height}, 0, 0, cv::INTER_AREA);
+  return io::encode_jpeg(smaller, kQuality);
 }
 
 Status write_image(const std::filesystem::path& file, const cv::Mat& image) {

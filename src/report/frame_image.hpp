@@ -32,7 +32,7 @@ namespace stemvo {
                                          const std::string& right);
 
 /// The paper's Figure 1: a frame and its channels (8 bits, gray or RGB) in a grid, all at the size
-/// of the first or smaller, each over its caption.
+/// of the first or smaller, each over its caption (checked).
 [[nodiscard]] cv::Mat draw_sheet(const std::vector<cv::Mat>& images,
                                  const std::vector<std::string>& captions);
 

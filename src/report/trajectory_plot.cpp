@@ -97,7 +97,12 @@ void draw_grid(const View& view, const std::string& unit, cv::Mat& image) {
   });
   cv::rectangle(image, frame, cv::Scalar::all(115), 2);
   put_caption(image, {frame.x, frame.br().y + kLine_px, frame.width, kLine_px},
-              fmt::format("x, to the right, and z, forward [{}]", unit), kPlotInk, 0.5);
+              fmt::format("x, to the right [{}]", unit), kPlotInk, 0.5);
+  cv::Mat upright(kLine_px, frame.height, CV_8UC3, kWhite);
+  put_caption(upright, {0, 0, frame.height, kLine_px}, fmt::format("z, forward [{}]", unit),
+              kPlotInk, 0.5);
+  cv::rotate(upright, image(cv::Rect(8, frame.y, kLine_px, frame.height)),
+             cv::ROTATE_90_COUNTERCLOCKWISE);
 }
 
 void draw_path(const Trajectory& path,
