@@ -61,9 +61,7 @@ nlohmann::ordered_json document(const CalibrateArguments& arguments,
 
 int report(const CalibrateArguments& arguments, const CalibrationReport& report) {
   const std::string file = arguments.request.out_file.string();
-  for (const std::string& warning : report.warnings) {
-    print_warning(warning);
-  }
+  std::ranges::for_each(report.warnings, print_warning);
   if (report.interrupted) {
     print_warning(fmt::format("interrupted; {} was not written", file));
     return kExitInterrupted;

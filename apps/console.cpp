@@ -123,11 +123,7 @@ void catch_interrupts() {
 bool is_interrupted() { return interrupted; }
 
 Progress::Progress(std::string unit, bool is_quiet)
-    : unit_(std::move(unit)),
-      is_quiet_(is_quiet),
-      is_terminal_(::isatty(STDERR_FILENO) == 1),
-      start_(Clock::now()),
-      last_(start_) {}
+    : unit_(std::move(unit)), is_quiet_(is_quiet), is_terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 bool Progress::operator()(std::size_t done, std::size_t total) {
   const bool go_on = !is_interrupted();

@@ -67,8 +67,8 @@ class Progress {
   std::string unit_;
   bool is_quiet_;
   bool is_terminal_;
-  Clock::time_point start_;
-  Clock::time_point last_;
+  Clock::time_point start_ = Clock::now();
+  Clock::time_point last_ = start_;
 };
 
 }  // namespace stemvo::apps

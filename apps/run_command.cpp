@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <atomic>
 #include <string>
 #include <vector>
@@ -99,20 +100,6 @@ nlohmann::ordered_json row_of(std::size_t frame, const FrameResult& result, cons
             {"quaternion_xyzw", numbers(map.rotation.coeffs())}}}};
 }
 
-void print_summary(const RunArguments& arguments, const RunSummary& summary) {
-  if (arguments.is_quiet) {
-    return;
-  }
-  print(format_metrics_table(summary.report));
-  if (summary.report.timing) {
-    print('\n' + format_timing_table(*summary.report.timing) + '\n');
-  }
-  if (arguments.request.out_dir.empty()) {
-    print(fmt::format("results: {}\n", summary.out_dir.string()));
-  }
-  print(fmt::format("report: {}\n", (summary.out_dir / "report.html").string()));
-}
-
 Expected<int> run(RunArguments& arguments) {
   RunRequest& request = arguments.request;
   STEMVO_TRY_GET(request.config, read_config(arguments.config));
@@ -134,9 +121,7 @@ Expected<int> run(RunArguments& arguments) {
     return progress(done, total) && is_read;
   };
   STEMVO_TRY_GET(const RunSummary summary, run_sequence(request, go_on));
-  for (const std::string& warning : summary.warnings) {
-    print_warning(warning);
-  }
+  std::ranges::for_each(summary.warnings, print_warning);
   if (summary.interrupted) {
     print_warning(fmt::format("interrupted; the results hold the first {} frames",
                               summary.report.num_frames));
@@ -144,7 +129,16 @@ Expected<int> run(RunArguments& arguments) {
   if (!summary.written) {
     return summary.written.error();
   }
-  print_summary(arguments, summary);
+  if (!arguments.is_quiet) {
+    print(format_metrics_table(summary.report));
+    if (summary.report.timing) {
+      print('\n' + format_timing_table(*summary.report.timing) + '\n');
+    }
+    if (request.out_dir.empty()) {
+      print(fmt::format("results: {}\n", summary.out_dir.string()));
+    }
+    print(fmt::format("report: {}\n", (summary.out_dir / "report.html").string()));
+  }
   nlohmann::ordered_json json = metrics_document(summary.report);
   json["out_dir"] = summary.out_dir.string();
   json["interrupted"] = summary.interrupted;

@@ -49,7 +49,7 @@ nb::list row_of(const FrameResult& r) {
 }
 
 void bind_result(nb::module_& module) {
-  module.attr("FRAMES_CSV_HEADER") = std::string(frames_csv_header());
+  module.attr("FRAMES_CSV_HEADER") = std::string(kFramesCsvHeader);
   nb::class_<CameraSigma>(module, "CameraSigma", "Standard deviations of a camera, in pixels")
       .def_ro("fx", &CameraSigma::fx_px)
       .def_ro("cx", &CameraSigma::cx_px)

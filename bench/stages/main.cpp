@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
     }
     const char* models = std::getenv("STEMVO_BENCH_MODELS");
     stemvo::bench::register_stems(models != nullptr ? models : "");
-    const stemvo::pipeline::ThreadScope one_thread(1);
+    const auto one_thread = stemvo::pipeline::limit_threads(1);
     const auto& frames = stemvo::bench::frames();
     benchmark::AddCustomContext("stemvo", std::string(stemvo::version()));
     benchmark::AddCustomContext("frames",

@@ -14,13 +14,10 @@ namespace stemvo {
 /// what was looked at (file and line where there is one), what was expected and what was found.
 struct Error {
   std::string message;
-  bool lacks_memory = false;  ///< what was looked at may be sound
 };
 
 /// `return fail("calib.txt:3: expected ...")` from any function that returns Expected.
-[[nodiscard]] inline Error fail(std::string message, bool lacks_memory = false) {
-  return {std::move(message), lacks_memory};
-}
+[[nodiscard]] inline Error fail(std::string message) { return {std::move(message)}; }
 
 /// A value, or the Error that kept us from it (C++23's std::expected, as far as it is used here).
 /// value(), * and -> of an error throw std::runtime_error with its message; error() of a value

@@ -77,7 +77,6 @@ struct FrameSource {
 
   /// Of a stream: the most there may be.
   [[nodiscard]] std::size_t size() const { return stream ? stream->max_frames : files.size(); }
-  [[nodiscard]] bool has_ground_truth() const { return ground_truth || match; }
   /// The time of a frame; a stream knows it after the frame was read.
   [[nodiscard]] double time_s(std::size_t index) const {
     return stream ? stream->time_s(index) : timestamps_s[index];

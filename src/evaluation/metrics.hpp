@@ -48,6 +48,8 @@ struct Metrics {
 /// (checked).
 [[nodiscard]] Metrics evaluate(const PosePairs& given, const EvaluationOptions& options = {});
 
+/// The devkit's: every 10th frame starts a segment.
+inline constexpr std::size_t kFirstFrameStep = 10;
 /// Error of one segment, first frame to the first one more than `length_m` behind it.
 struct SegmentError {
   std::size_t first = 0;

@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <iterator>
 #include <numeric>
 #include <optional>
 #include <regex>
 #include <string>
 #include <string_view>
 
-#include <fmt/core.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "text/text_file.hpp"
 #include "try.hpp"
@@ -284,21 +283,15 @@ Trajectory rescale_steps(const PosePairs& pairs) {
 }
 
 std::string kitti_row(const Rigid3& world_from_camera) {
-  const Matrix34d matrix = world_from_camera.matrix();
-  std::string text;
-  for (int i = 0; i < 12; ++i) {
-    // + 0.0 turns -0 into 0.
-    fmt::format_to(std::back_inserter(text), "{:.12e}{}", matrix(i / 4, i % 4) + 0.0,
-                   i == 11 ? '\n' : ' ');
-  }
-  return text;
+  // + 0.0 turns -0 into 0.
+  const Eigen::Array<double, 3, 4, Eigen::RowMajor> rows = world_from_camera.matrix().array() + 0.0;
+  return fmt::format("{:.12e}\n", fmt::join(rows.data(), rows.data() + rows.size(), " "));
 }
 
 std::string tum_row(double timestamp_s, const Rigid3& world_from_camera) {
-  const Eigen::Vector3d t = world_from_camera.translation.array() + 0.0;
+  const Eigen::Array3d t = world_from_camera.translation.array() + 0.0;
   const Eigen::Array4d q = world_from_camera.rotation.coeffs().array() + 0.0;
-  return fmt::format("{:.9f} {:.12e} {:.12e} {:.12e} {:.12e} {:.12e} {:.12e} {:.12e}\n",
-                     timestamp_s, t.x(), t.y(), t.z(), q[0], q[1], q[2], q[3]);
+  return fmt::format("{:.9f} {:.12e} {:.12e}\n", timestamp_s, fmt::join(t, " "), fmt::join(q, " "));
 }
 
 Status write_kitti_trajectory(const std::filesystem::path& file,

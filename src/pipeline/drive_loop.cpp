@@ -22,25 +22,9 @@
 namespace stemvo::pipeline {
 namespace {
 
-/// A file of rows that grows with every frame: a run that is killed leaves whole rows.
-class GrowingFile {
- public:
-  explicit GrowingFile(const std::filesystem::path& file)
-      : file_(file), stream_(file, std::ios::binary) {}
-
-  void write(std::string_view rows) {
-    stream_ << rows << std::flush;
-    if (!stream_ && status_) {
-      status_ = fail(fmt::format("{}: cannot write: {}", file_.string(),
-                                 std::generic_category().message(errno)));
-    }
-  }
-  [[nodiscard]] const Status& status() const { return status_; }
-
- private:
-  std::filesystem::path file_;
-  std::ofstream stream_;
-  Status status_;
+struct GrowingFile {
+  std::filesystem::path path;
+  std::ofstream stream = std::ofstream(path, std::ios::binary);
 };
 
 /// Whether frame i is one of the few in report.html: evenly spaced among n, each twice as far as
@@ -62,8 +46,8 @@ std::size_t expected_frames(const FrameSource& sequence, std::size_t num_done) {
 class DriveLoop {
  public:
   DriveLoop(const Run& run, const RunProgress& progress) : run_(run), progress_(progress) {
-    drive_.csv = frames_csv_header();
-    rows_.write(drive_.csv);
+    drive_.csv = kFramesCsvHeader;
+    append(rows_, drive_.csv);
   }
 
   Drive drive() {
@@ -76,14 +60,20 @@ class DriveLoop {
     if (run_.sequence.stream) {
       end_stream(*run_.sequence.stream);
     }
-    for (const GrowingFile* file : {&rows_, &kitti_, &tum_}) {
-      keep_first(drive_.written, file->status());
-    }
     keep_first(drive_.written, run_.video.finish());
     return std::move(drive_);
   }
 
  private:
+  /// With every frame: a run that is killed leaves whole rows.
+  void append(GrowingFile& file, std::string_view rows) {
+    file.stream << rows << std::flush;
+    if (!file.stream) {
+      keep_first(drive_.written, fail(fmt::format("{}: cannot write: {}", file.path.string(),
+                                                  std::generic_category().message(errno))));
+    }
+  }
+
   /// False: the run ends behind this frame.
   bool visit(std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
     const std::size_t number = run_.sequence.range.begin + i;
@@ -99,12 +89,12 @@ class DriveLoop {
     const Rigid3& written = drive_.trajectory.emplace_back(as_written(i, pose.world_from_camera));
     const std::string row = frames_csv_row(number, time_s, pose, written);
     drive_.csv += row;
-    rows_.write(row);
+    append(rows_, row);
     if (run_.request.on_frame) {
       run_.request.on_frame(number, pose, written);
     }
-    kitti_.write(kitti_row(written));
-    tum_.write(tum_row(time_s, written));
+    append(kitti_, kitti_row(written));
+    append(tum_, tum_row(time_s, written));
     keep_image(i, frame, pose);
     const std::size_t expected = expected_frames(run_.sequence, i + 1);
     drive_.interrupted = progress_ && !progress_(i + 1, expected) && i + 1 < run_.sequence.size();

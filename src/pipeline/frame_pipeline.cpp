@@ -80,7 +80,7 @@ void run_frames(const FrameSource& sequence,
     if (i == 0) {
       given.ways = beside.ways;
     } else {
-      given.hints = beside.hints(last_s, time_s);
+      given.hints.prev_from_cur = dataset::integrate_gyro(beside.gyro, last_s, time_s);
     }
     last_s = time_s;
     if (!loops.push(std::move(given))) {
@@ -88,14 +88,6 @@ void run_frames(const FrameSource& sequence,
     }
   }
   loops.finish();
-}
-
-FrameHints BesideFrames::hints(double last_s, double time_s) const {
-  FrameHints hints;
-  if (!gyro.empty()) {
-    hints.prev_from_cur = dataset::integrate_gyro(gyro, last_s, time_s);
-  }
-  return hints;
 }
 
 std::vector<std::string> BesideFrames::warnings(double first_s, double last_s) const {

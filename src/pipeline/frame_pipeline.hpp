@@ -16,7 +16,7 @@
 #include "odometry/way.hpp"
 #include "pipeline/run.hpp"
 #include "stemvo/error.hpp"
-#include "stemvo/odometry.hpp"
+#include "stemvo/frame_result.hpp"
 
 namespace stemvo::pipeline {
 
@@ -32,7 +32,6 @@ struct BesideFrames {
   };
   std::vector<Span> spans;  ///< of the files read
 
-  [[nodiscard]] FrameHints hints(double last_s, double time_s) const;
   /// A line for each file whose times are all before or all behind those of the frames.
   [[nodiscard]] std::vector<std::string> warnings(double first_s, double last_s) const;
 };
@@ -55,23 +54,12 @@ void run_frames(const FrameSource& sequence,
                 const FrameVisitor& visit,
                 const BesideFrames& beside = {});
 
-/// While it lives, OpenCV works on `num_threads` threads (0: one per core) in the whole process.
-class ThreadScope {
- public:
-  explicit ThreadScope(int num_threads)
-      : num_threads_(num_threads > 0 ? num_threads : cv::getNumberOfCPUs()) {
-    cv::setNumThreads(num_threads_);
-  }
-  ~ThreadScope() { cv::setNumThreads(opencv_before_); }
-  ThreadScope(const ThreadScope&) = delete;
-  ThreadScope& operator=(const ThreadScope&) = delete;
-
- private:
-  int num_threads_;
-  int opencv_before_ = cv::getNumThreads();
-  /// Limits OpenCV's threads where it is built with TBB.
-  tbb::global_control limit_{tbb::global_control::max_allowed_parallelism,
-                             static_cast<std::size_t>(num_threads_)};
-};
+/// OpenCV works on `num_threads` threads (0: one per core) in the whole process from here on; where
+/// it is built with TBB, while the result lives.
+[[nodiscard]] inline tbb::global_control limit_threads(int num_threads) {
+  const int limit = num_threads > 0 ? num_threads : cv::getNumberOfCPUs();
+  cv::setNumThreads(limit);
+  return {tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(limit)};
+}
 
 }  // namespace stemvo::pipeline

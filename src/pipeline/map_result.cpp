@@ -54,16 +54,6 @@ MapResult finish_map(const Run& run) {
   return map;
 }
 
-std::vector<std::pair<std::size_t, std::size_t>> loops_of(const KeptMap& map) {
-  std::vector<std::pair<std::size_t, std::size_t>> frames;
-  for (const auto& [from, to] : frames_of_loops(map)) {
-    if (from >= 0) {
-      frames.emplace_back(from, to);
-    }
-  }
-  return frames;
-}
-
 Status write_map_ply(const Run& run, const MapResult& map) {
   std::vector<ColoredPoint> points;
   for (const KeptLandmark& landmark : map.whole.landmarks) {

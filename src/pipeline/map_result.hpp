@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstddef>
 #include <optional>
-#include <utility>
-#include <vector>
 
 #include "evaluation/trajectory.hpp"
 #include "odometry/whole_map.hpp"
@@ -24,9 +21,6 @@ struct MapResult {
 /// Adjusted where places were seen again, or where that is asked for; with
 /// scale.source=ground_truth steps get their true length.
 [[nodiscard]] MapResult finish_map(const Run& run);
-
-/// Pairs of frames, the older first; without those of another recording's map.
-[[nodiscard]] std::vector<std::pair<std::size_t, std::size_t>> loops_of(const KeptMap& map);
 
 /// map.ply: landmarks and the camera's path among them. Where steps are rescaled, both are.
 [[nodiscard]] Status write_map_ply(const Run& run, const MapResult& map);

@@ -2,6 +2,7 @@
 #include "pipeline/result_files.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <span>
 
 #include <fmt/format.h>
@@ -43,6 +44,10 @@ std::string describe_frames(const FrameSource& sequence, std::size_t num_frames)
   const std::string end = num_frames > 0 ? std::to_string(begin + num_frames) : "";
   // A line break in a name must not end the comment it stands in.
   return one_line(fmt::format("frames {}:{} of {}", begin, end, sequence.name));
+}
+
+bool is_scale_measured(const FrameResult& frame) {
+  return frame.scale_state == ScaleState::kMeasured;
 }
 
 template <typename Predicate>
@@ -101,9 +106,8 @@ class ResultWriter {
   /// All but metrics.json and report.html.
   [[nodiscard]] Status write(MetricsReport& report) {
     const std::filesystem::path& folder = request_.out_dir;
-    Status written = write_poses("trajectory", trajectory_);
+    Status written = drive_.written;
     report = make_report();
-    keep_first(written, drive_.written);
     if (truth_) {
       csv_ = frames_csv_with_errors(drive_.csv, frame_errors(report));
       keep_first(written, write_text_file(folder / "frames.csv", csv_));
@@ -125,7 +129,12 @@ class ResultWriter {
     const TrajectoryPlot plot = make_plot(report);
     std::optional<MapPage> map;
     if (map_ && report.map) {
-      map = {in_truth(map_->trajectory, report), loops_of(map_->whole.kept)};
+      map = {in_truth(map_->trajectory, report), {}};
+      for (const auto& [from, to] : frames_of_loops(map_->whole.kept)) {
+        if (from >= 0) {  // else of another recording's map
+          map->loops.emplace_back(from, to);
+        }
+      }
     }
     return write_run_page(request_.out_dir / "report.html",
                           {plot, report, csv_, map, truth_, drive_.images,
@@ -148,16 +157,6 @@ class ResultWriter {
     return GroundTruth{relative_to_first(std::span(truth.poses).subspan(skipped)),
                        {first, truth.frames.end()}};
   }
-  [[nodiscard]] Status write_poses(const std::string& name, const Trajectory& poses) const {
-    const std::filesystem::path& folder = request_.out_dir;
-    std::vector<double> times_s;
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      times_s.push_back(sequence_.time_s(i));
-    }
-    Status written = write_kitti_trajectory(folder / (name + "_kitti.txt"), poses);
-    keep_first(written, write_tum_trajectory(folder / (name + "_tum.txt"), times_s, poses));
-    return written;
-  }
 
   [[nodiscard]] Status write_map(MetricsReport& report) {
     map_ = finish_map(run_);
@@ -165,7 +164,14 @@ class ResultWriter {
     if (!request_.config.odometry.loops) {
       return written;
     }
-    keep_first(written, write_poses("trajectory_map", map_->trajectory));
+    const std::filesystem::path& folder = request_.out_dir;
+    const Trajectory& poses = map_->trajectory;
+    std::vector<double> times_s;
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      times_s.push_back(sequence_.time_s(i));
+    }
+    keep_first(written, write_kitti_trajectory(folder / "trajectory_map_kitti.txt", poses));
+    keep_first(written, write_tum_trajectory(folder / "trajectory_map_tum.txt", times_s, poses));
     if (request_.saved_map) {
       keep_first(written, run_.odometry.save_map(*request_.saved_map, map_->whole.kept));
     }
@@ -192,7 +198,6 @@ class ResultWriter {
         std::chrono::steady_clock::now() - request_.started;
     const Config& config = request_.config;
     MetricsReport report;
-    report.stemvo_version = version();
     report.sequence = sequence_.name;
     report.first_frame = sequence_.range.begin;
     report.num_frames = trajectory_.size();
@@ -200,35 +205,25 @@ class ResultWriter {
     report.filter = run_.odometry.stem_info().filter;
     report.fps = static_cast<double>(trajectory_.size()) / std::max(elapsed.count(), 1e-9);
     report.scale_source = scale_source(config);
-    if (has_speeds()) {
+    if (!run_.beside.ways.empty() && std::ranges::any_of(drive_.frames, is_scale_measured)) {
       report.scale_source =
           config.scale.source == ScaleSource::kNone ? "speed" : report.scale_source + " and speed";
     }
-    report.tracked_fraction =
-        share_of(drive_.frames, [](const FrameResult& frame) { return frame.is_measured; });
+    report.tracked_fraction = share_of(drive_.frames, std::mem_fn(&FrameResult::is_measured));
     add_maps(drive_.frames, report);
     report.in_place_fraction = share_in_place(drive_.frames);
     const FrameResult& last = drive_.frames.back();
     report.camera = {last.camera, last.camera_sigma, last.radial};
     if (config.scale.source == ScaleSource::kCameraHeight) {
-      report.road_measured_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
-        return frame.scale_state == ScaleState::kMeasured;
-      });
+      report.road_measured_fraction = share_of(drive_.frames, is_scale_measured);
       report.road_believed_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
-        return frame.scale_state == ScaleState::kMeasured || frame.scale_state == ScaleState::kHeld;
+        return is_scale_measured(frame) || frame.scale_state == ScaleState::kHeld;
       });
     }
     if (truth_) {
       report.metrics = metrics_of(trajectory_, report);
     }
     return report;
-  }
-
-  [[nodiscard]] bool has_speeds() const {
-    return !run_.beside.ways.empty() &&
-           std::ranges::any_of(drive_.frames, [](const FrameResult& frame) {
-             return frame.scale_state == ScaleState::kMeasured;
-           });
   }
 
   [[nodiscard]] TrajectoryPlot make_plot(const MetricsReport& report) const {

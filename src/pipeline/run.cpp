@@ -27,22 +27,12 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   FrameSourceRequest source = request;
   source.camera = request.config.input.camera;
   auto sequence = open_source(source);
-  if (!sequence || request.config.scale_choice != ScaleChoice::kGroundTruth) {
-    return sequence;
-  }
-  if (!sequence->has_ground_truth()) {
-    const auto file = sequence->is_kitti
-                          ? request.sequence_dir / "../../poses" / (sequence->name + ".txt")
-                          : request.sequence_dir;
+  if (sequence && request.config.scale_choice == ScaleChoice::kGroundTruth &&
+      !(sequence->ground_truth && sequence->ground_truth->frames.size() == sequence->size())) {
     return fail(fmt::format(
-        "{}: expected a pose file, which scale.source=ground_truth needs, found none (see --gt)",
-        file.lexically_normal().string()));
-  }
-  if (sequence->stream || sequence->ground_truth->frames.size() < sequence->size()) {
-    return fail(fmt::format(
-        "{}: expected a true pose of every frame, which scale.source=ground_truth needs, found {}",
-        sequence->ground_truth_file->string(),
-        sequence->stream ? "a stream, whose times are not known before" : "some only"));
+        "{}: expected a true pose of every frame (see --gt), which scale.source=ground_truth "
+        "needs, found none, some only or a stream, whose times are not known before",
+        request.sequence_dir.string()));
   }
   return sequence;
 }
@@ -87,7 +77,7 @@ std::string describe_size(const FrameSource& sequence) {
   return fmt::format("{} of {}x{} pixels{}", count, full.width, full.height, worked_on);
 }
 
-void note_start(const Run& run, bool is_replacing) {
+void note_start(const Run& run) {
   const auto& [request, sequence, odometry, beside, video] = run;
   if (!request.note) {
     return;
@@ -97,11 +87,6 @@ void note_start(const Run& run, bool is_replacing) {
                            beside.note));
   for (const std::vector<std::string>& notes : {sequence.notes, beside.unit_notes}) {
     std::ranges::for_each(notes, request.note);
-  }
-  if (is_replacing) {
-    request.note(
-        fmt::format("files of an earlier result in {} are replaced (another --out keeps them)",
-                    request.out_dir.string()));
   }
 }
 
@@ -145,17 +130,18 @@ Expected<RunSummary> run_source(RunRequest request,
   }
   pipeline::DriveVideo video;
   const Run run{request, sequence, odometry, beside, video};
-  const bool is_replacing = pipeline::is_folder_of(request.out_dir, "run");
-  auto inputs = pipeline::input_files(request, sequence, request.config);
-  inputs.insert(inputs.end(),
-                {request.speeds.value_or(""), request.gyro.value_or(""), request.map.value_or("")});
-  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(request.out_dir, "run", inputs));
-  // Before anything is removed: a wrong name costs no earlier result.
+  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(request.out_dir, "run"));
+  // Before anything is removed: a wrong name costs no earlier result, nor the frames.
+  STEMVO_TRY(pipeline::check_is_no_input(
+      request.out_dir / "pictures", {request.sequence_dir, request.sequence_dir.parent_path()}));
   if (request.saved_map) {
     STEMVO_TRY(check_place_of_map(*request.saved_map));
     STEMVO_TRY(check_can_write(*request.saved_map));
   }
   if (request.video) {
+    auto inputs = pipeline::input_files(request, sequence, request.config);
+    inputs.insert(inputs.end(), {request.speeds.value_or(""), request.gyro.value_or(""),
+                                 request.map.value_or("")});
     STEMVO_TRY(pipeline::check_is_no_input(*request.video, inputs));
     STEMVO_TRY_GET(video, pipeline::DriveVideo::create(request, sequence));
   }
@@ -163,7 +149,7 @@ Expected<RunSummary> run_source(RunRequest request,
   if (request.measure_times) {
     recorder.emplace();
   }
-  note_start(run, is_replacing);
+  note_start(run);
   return finish_run(run, progress);
 }
 
@@ -175,7 +161,7 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   if (request.num_threads > 0) {
     resolved.config.threads = request.num_threads;
   }
-  const pipeline::ThreadScope scope(resolved.config.threads);
+  const auto limit = pipeline::limit_threads(resolved.config.threads);
   STEMVO_TRY_GET(const auto sequence, open_sequence(resolved));
   return run_source(std::move(resolved), sequence, progress);
 }
@@ -191,9 +177,7 @@ Expected<ChannelImagesReport> write_channel_images(const ChannelImagesRequest& r
       const FrameRange filters,
       dataset::resolve_range(request.filters, static_cast<std::size_t>(stem.info().num_filters),
                              stem.info().model, "filters"));
-  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(
-                                      request.out_dir, "channel",
-                                      pipeline::input_files(request, sequence, request.config)));
+  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(request.out_dir, "channel"));
   std::size_t num_written = 0;
   const auto save = [&](const cv::Mat& image, std::size_t number, const std::string& name) {
     ++num_written;

@@ -13,19 +13,11 @@
 namespace stemvo {
 namespace {
 
-constexpr std::string_view kHeader =
-    "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
-    "scale_sigma,scale_state,fx_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px,"
-    "recognized_frame,map_scale,map_x,map_y,map_z,map_qx,map_qy,map_qz,map_qw,"
-    "map_id,is_scale_new,x,y,z,qx,qy,qz,qw,"
-    "step_var_x,step_var_y,step_var_z,step_var_rx,step_var_ry,step_var_rz,error_m,error_deg\n";
-
 constexpr std::string_view kModels[] = {"none", "homography", "essential"};  // by TwoViewModel
 
 /// x, y, z, qx, qy, qz, qw.
 std::string pose_columns(const Eigen::Vector3d& t, const Eigen::Quaterniond& q) {
-  return fmt::format("{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}", t.x(), t.y(), t.z(), q.x(),
-                     q.y(), q.z(), q.w());
+  return fmt::format("{:.9g},{:.9g}", fmt::join(t, ","), fmt::join(q.coeffs(), ","));
 }
 
 static_assert(std::endian::native == std::endian::little, "as the file");
@@ -58,8 +50,6 @@ std::string header(std::size_t num_vertices, std::size_t num_edges) {
 
 }  // namespace
 
-std::string_view frames_csv_header() { return kHeader; }
-
 std::string frames_csv_row(std::size_t frame,
                            double timestamp_s,
                            const FrameResult& r,
@@ -84,7 +74,7 @@ std::string frames_csv_row(std::size_t frame,
 }
 
 std::string frames_csv_with_errors(std::string_view table, std::span<const FrameError> errors) {
-  std::string result(kHeader);
+  std::string result(kFramesCsvHeader);
   auto error = errors.begin();
   const std::vector<std::string_view> lines = split_lines(table);
   for (std::size_t row = 0; row + 1 < lines.size(); ++row) {

@@ -18,7 +18,12 @@
 namespace stemvo {
 
 /// With its newline: docs/results.md says what each column holds.
-[[nodiscard]] std::string_view frames_csv_header();
+inline constexpr std::string_view kFramesCsvHeader =
+    "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
+    "scale_sigma,scale_state,fx_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px,"
+    "recognized_frame,map_scale,map_x,map_y,map_z,map_qx,map_qy,map_qz,map_qw,"
+    "map_id,is_scale_new,x,y,z,qx,qy,qz,qw,"
+    "step_var_x,step_var_y,step_var_z,step_var_rx,step_var_ry,step_var_rz,error_m,error_deg\n";
 /// A row with its newline; the frame in the folder's numbering, the pose as result files hold it.
 /// The columns of its error are empty.
 [[nodiscard]] std::string frames_csv_row(std::size_t frame,

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "report/evaluate_report.hpp"
+#include "stemvo/version.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
 #include "try.hpp"
@@ -14,7 +15,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kInPlace = 0.95;  ///< a larger share of such frames is told
+constexpr double kFewBelieved = 0.5;  ///< a smaller share is warned of
+constexpr double kInPlace = 0.95;     ///< a larger share of such frames is told
 
 std::string scale_explained(const MetricsReport& report) {
   const std::string& source = report.scale_source;
@@ -195,7 +197,7 @@ Expected<Json> read_json_object(const std::filesystem::path& file) {
 }
 
 Json metrics_document(const MetricsReport& report) {
-  Json json = {{"stemvo_version", report.stemvo_version},
+  Json json = {{"stemvo_version", version()},
                {"sequence", report.sequence},
                {"first_frame", report.first_frame},
                {"frames", report.num_frames},

@@ -43,7 +43,6 @@ struct MapReport {
 
 /// The numbers of metrics.json. Everything in `metrics` is null in the file without ground truth.
 struct MetricsReport {
-  std::string stemvo_version;
   std::string sequence;         ///< folder name, e.g. "03"
   std::size_t first_frame = 0;  ///< in the folder's numbering
   std::size_t num_frames = 0;   ///< key `frames`
@@ -69,7 +68,6 @@ struct MetricsReport {
   }
 };
 
-inline constexpr double kFewBelieved = 0.5;
 /// The warning about a road that was believed never or on few frames; empty where all is well.
 [[nodiscard]] std::string warn_of_road(const MetricsReport& report);
 

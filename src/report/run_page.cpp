@@ -9,8 +9,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kFirstFrameStep = 10;  // the devkit's
-
 Json segments_json(const RunPage& run) {
   const auto& [truth, frames] = *run.ground_truth;
   Json lists = {

@@ -34,49 +34,23 @@ Expected<OnnxSession> open_session(const std::string& model) {
       [&](const std::string& bytes) { return OnnxSession::create(label_of(model), bytes); });
 }
 
-/// Reads the keys `stemvo.*` of a model's metadata, up to the first that is wrong.
-class InfoReader {
- public:
-  InfoReader(std::string label, const OnnxSession& session)
-      : label_(std::move(label)), session_(session) {}
-
-  Expected<ModelInfo> read() {
-    ModelInfo info;
-    info.network = text("network");
-    info.layer = text("layer");
-    info.licence = text("licence");
-    info.command = text("command");
-    numbers("kernel", info.kernel_px, 1, kMax);
-    numbers("stride", std::span(&info.stride_px, 1), 1, kMaxStride_px);
-    // A window wholly in the padding would see nothing of the frame.
-    numbers("padding", info.padding_px, 0, std::ranges::min(info.kernel_px) - 1);
-    numbers("filters", std::span(&info.num_filters, 1), 1, kMax);
-    numbers("default_filter", std::span(&info.default_filter, 1), 0, info.num_filters - 1);
-    if (!value_of("filter").empty()) {
-      numbers("filter", std::span(&info.only_filter.emplace(), 1), 0, info.num_filters - 1);
-    }
-    info.native_sampling_only = value_of("sampling") == "native";
-    return status_ ? Expected<ModelInfo>(info) : status_.error();
-  }
-
- private:
-  /// "": there is none.
-  [[nodiscard]] std::string value_of(const std::string& key) const {
-    return session_.metadata("stemvo." + key).value_or(std::nullopt).value_or("");
-  }
-
-  std::string text(const char* key) {
+/// The keys `stemvo.*` of a model's metadata. Error: of the first that is wrong.
+Expected<ModelInfo> read_info(const std::string& label, const OnnxSession& session) {
+  Status status;
+  const auto value_of = [&](const std::string& key) {  // "": there is none
+    return session.metadata("stemvo." + key).value_or("");
+  };
+  const auto text = [&](const std::string& key) {
     std::string value = value_of(key);
-    if (status_ && value.empty()) {
-      status_ = fail(
+    if (status && value.empty()) {
+      status = fail(
           fmt::format("{}: expected metadata stemvo.{}, found none; stemvo-lab export writes files "
                       "that have it",
-                      label_, key));
+                      label, key));
     }
     return value;
-  }
-
-  void numbers(const char* key, std::span<int> out, int min, int max) {
+  };
+  const auto numbers = [&](const std::string& key, std::span<int> out, int min, int max) {
     const std::string value = text(key);
     const auto found = parse_numbers(value, out.size());
     const auto is_good = [&](double number) {
@@ -84,18 +58,29 @@ class InfoReader {
     };
     if (found && std::ranges::all_of(*found, is_good)) {
       std::ranges::copy(*found, out.begin());
-    } else if (status_) {
-      status_ =
-          fail(fmt::format("{}: stemvo.{}: expected {} whole numbers from {} to {}, found "
-                           "'{}'",
-                           label_, key, out.size(), min, max, one_line(value)));
+    } else if (status) {
+      status =
+          fail(fmt::format("{}: stemvo.{}: expected {} whole numbers from {} to {}, found '{}'",
+                           label, key, out.size(), min, max, one_line(value)));
     }
+  };
+  ModelInfo info;
+  info.network = text("network");
+  info.layer = text("layer");
+  info.licence = text("licence");
+  info.command = text("command");
+  numbers("kernel", info.kernel_px, 1, kMax);
+  numbers("stride", std::span(&info.stride_px, 1), 1, kMaxStride_px);
+  // A window wholly in the padding would see nothing of the frame.
+  numbers("padding", info.padding_px, 0, std::ranges::min(info.kernel_px) - 1);
+  numbers("filters", std::span(&info.num_filters, 1), 1, kMax);
+  numbers("default_filter", std::span(&info.default_filter, 1), 0, info.num_filters - 1);
+  if (!value_of("filter").empty()) {
+    numbers("filter", std::span(&info.only_filter.emplace(), 1), 0, info.num_filters - 1);
   }
-
-  const std::string label_;
-  const OnnxSession& session_;
-  Status status_;
-};
+  info.native_sampling_only = value_of("sampling") == "native";
+  return status ? Expected<ModelInfo>(info) : status.error();
+}
 
 using internal::SamplingAxis;
 using internal::SamplingPlan;
@@ -243,13 +228,13 @@ Expected<std::string> read_model(const std::string& model) {
 
 Expected<ModelInfo> read_model_info(const std::string& model) {
   STEMVO_TRY_GET(const OnnxSession session, open_session(model));
-  return InfoReader(label_of(model), session).read();
+  return read_info(label_of(model), session);
 }
 
 Expected<internal::Model> internal::open_model(const std::string& model) {
   STEMVO_TRY_GET(auto session, open_session(model));
   const std::string label = label_of(model);
-  STEMVO_TRY_GET(const auto info, InfoReader(label, session).read());
+  STEMVO_TRY_GET(const auto info, read_info(label, session));
   const int expected = info.only_filter ? 1 : info.num_filters;
   if (session.num_filters() != expected) {
     return fail(

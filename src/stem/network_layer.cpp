@@ -5,7 +5,6 @@
 #include <array>
 #include <memory>
 #include <mutex>
-#include <new>
 #include <utility>
 
 #include <fmt/format.h>
@@ -38,12 +37,7 @@ class NetworkLayer {
       channel.values.create(plan_.channel_size(frame.size()), CV_32F);
       channel.map = plan_.map();
     }
-    if (Status status = run_passes(first, channels); !status) {
-      if (status.error().lacks_memory) {
-        throw std::bad_alloc();  // neither the model nor the frame is to blame
-      }
-      return status.error();
-    }
+    STEMVO_TRY(run_passes(first, channels));
     return channels;
   }
 

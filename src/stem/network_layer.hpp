@@ -5,7 +5,6 @@
 
 #include <opencv2/core.hpp>
 
-#include "internal_check.hpp"
 #include "stem/model.hpp"
 #include "stem/onnx_session.hpp"
 #include "stem/stem.hpp"
@@ -51,15 +50,12 @@ struct SamplingAxis {
   }
 };
 
-/// Both axes.
+/// Both axes; `sampling_px` divides the stride.
 struct SamplingPlan {
   SamplingPlan(const ModelInfo& info, int sampling_px)
       : x{info.kernel_px[1], info.stride_px, sampling_px, info.padding_px[1], info.padding_px[3]},
         y{info.kernel_px[0], info.stride_px, sampling_px, info.padding_px[0], info.padding_px[2]},
-        sees_windows_only(!info.native_sampling_only) {
-    STEMVO_CHECK(sampling_px >= 1 && info.stride_px % sampling_px == 0,
-                 "sampling divides the stride");
-  }
+        sees_windows_only(!info.native_sampling_only) {}
 
   SamplingAxis x;
   SamplingAxis y;

@@ -6,6 +6,7 @@
 #include <climits>
 #include <cstdint>
 #include <cstdlib>
+#include <new>
 #include <vector>
 
 #include <fmt/format.h>
@@ -17,19 +18,15 @@
 
 namespace stemvo::internal {
 
-/// Name, type and shape of one input or output of a graph.
+/// Name, type and shape of the graph's input or output.
 struct OnnxSession::TensorInfo {
   std::string name;
   ONNXTensorElementDataType type = ONNX_TENSOR_ELEMENT_DATA_TYPE_UNDEFINED;
   std::vector<std::int64_t> shape;  // -1: free
 
   [[nodiscard]] std::string describe() const {
-    std::vector<std::string> sizes;
-    for (const std::int64_t size : shape) {
-      sizes.push_back(size < 0 ? "?" : std::to_string(size));
-    }
     const bool is_float = type == ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT;
-    return fmt::format("{} {} {}", name, is_float ? "float" : "no float", fmt::join(sizes, "x"));
+    return fmt::format("{} {} {}", name, is_float ? "float" : "no float", fmt::join(shape, "x"));
   }
 
   /// A wanted size of -1 may be fixed or free in the graph.
@@ -62,18 +59,24 @@ Status OnnxSession::to_status(OrtStatus* raw) const {
   }
   const OnnxHandle<OrtStatus> status(raw, api_->ReleaseStatus);
   const std::string message = api_->GetErrorMessage(raw);
-  const bool is_memory = message.find("bad_alloc") != std::string::npos ||
-                         message.find("Failed to allocate memory") != std::string::npos;
-  return fail(fmt::format("{}: {}ONNX Runtime: {}", label_, is_memory ? "out of memory: " : "",
-                          one_line(message)),
-              is_memory);
+  if (message.find("bad_alloc") != std::string::npos ||
+      message.find("Failed to allocate memory") != std::string::npos) {
+    throw std::bad_alloc();  // neither the model nor the frame is to blame
+  }
+  return fail(fmt::format("{}: ONNX Runtime: {}", label_, one_line(message)));
+}
+
+template <typename T, typename Create, typename... Given>
+Expected<OnnxHandle<T>> OnnxSession::make(void (*release)(T*), Create call, Given... given) const {
+  T* made = nullptr;
+  STEMVO_ORT_TRY(call(given..., &made));
+  return OnnxHandle<T>(made, release);
 }
 
 Expected<OnnxSession> OnnxSession::create(const std::string& label, std::string_view model) {
   OnnxSession session(label);
   STEMVO_TRY(session.load(model));
-  STEMVO_TRY(session.check_input());
-  STEMVO_TRY(session.check_output());
+  STEMVO_TRY(session.check_tensors());
   return session;
 }
 
@@ -87,51 +90,48 @@ Status OnnxSession::load(std::string_view model) {
   // ONNX Runtime would send telemetry, and keep a file for it in the user's cache.
   ::setenv("ORT_DISABLE_TELEMETRY", "1", 0);
   // Fatal only: whatever goes wrong comes back as a status, and must not be printed twice.
-  OrtEnv* env = nullptr;
-  STEMVO_ORT_TRY(api_->CreateEnv(ORT_LOGGING_LEVEL_FATAL, "stemvo", &env));
-  env_ = {env, api_->ReleaseEnv};
-  OrtMemoryInfo* memory = nullptr;
-  STEMVO_ORT_TRY(api_->CreateCpuMemoryInfo(OrtDeviceAllocator, OrtMemTypeDefault, &memory));
-  memory_ = {memory, api_->ReleaseMemoryInfo};
-  OrtSessionOptions* options = nullptr;
-  STEMVO_ORT_TRY(api_->CreateSessionOptions(&options));
-  const OnnxHandle<OrtSessionOptions> options_handle(options, api_->ReleaseSessionOptions);
+  STEMVO_TRY_GET(env_, make(api_->ReleaseEnv, api_->CreateEnv, ORT_LOGGING_LEVEL_FATAL, "stemvo"));
+  STEMVO_TRY_GET(memory_, make(api_->ReleaseMemoryInfo, api_->CreateCpuMemoryInfo,
+                               OrtDeviceAllocator, OrtMemTypeDefault));
+  STEMVO_TRY_GET(const auto options, make(api_->ReleaseSessionOptions, api_->CreateSessionOptions));
   // One thread per pass: the passes over shifted images run side by side instead, and no sum
   // depends on the number of threads.
-  STEMVO_ORT_TRY(api_->SetSessionExecutionMode(options, ORT_SEQUENTIAL));
-  STEMVO_ORT_TRY(api_->SetIntraOpNumThreads(options, 1));
-  STEMVO_ORT_TRY(api_->SetInterOpNumThreads(options, 1));
-  STEMVO_ORT_TRY(api_->SetSessionGraphOptimizationLevel(options, ORT_ENABLE_ALL));
-  STEMVO_ORT_TRY(api_->SetSessionLogSeverityLevel(options, ORT_LOGGING_LEVEL_FATAL));
-  STEMVO_ORT_TRY(api_->AddSessionConfigEntry(options, kFolderOfWeights, "/none"));
-  OrtSession* session = nullptr;
-  STEMVO_ORT_TRY(api_->CreateSessionFromArray(env, model.data(), model.size(), options, &session));
-  session_ = {session, api_->ReleaseSession};
+  STEMVO_ORT_TRY(api_->SetSessionExecutionMode(options.get(), ORT_SEQUENTIAL));
+  STEMVO_ORT_TRY(api_->SetIntraOpNumThreads(options.get(), 1));
+  STEMVO_ORT_TRY(api_->SetInterOpNumThreads(options.get(), 1));
+  STEMVO_ORT_TRY(api_->SetSessionGraphOptimizationLevel(options.get(), ORT_ENABLE_ALL));
+  STEMVO_ORT_TRY(api_->SetSessionLogSeverityLevel(options.get(), ORT_LOGGING_LEVEL_FATAL));
+  STEMVO_ORT_TRY(api_->AddSessionConfigEntry(options.get(), kFolderOfWeights, "/none"));
+  STEMVO_TRY_GET(session_, make(api_->ReleaseSession, api_->CreateSessionFromArray, env_.get(),
+                                model.data(), model.size(), options.get()));
+  STEMVO_ORT_TRY(api_->GetAllocatorWithDefaultOptions(&allocator_));
   return {};
 }
 
-Expected<OnnxSession::TensorInfo> OnnxSession::read_tensor_info(bool is_input,
-                                                                std::size_t index) const {
+Expected<OnnxSession::TensorInfo> OnnxSession::read_tensor_info(bool is_input) const {
+  const auto get_count = is_input ? api_->SessionGetInputCount : api_->SessionGetOutputCount;
+  const auto get_name = is_input ? api_->SessionGetInputName : api_->SessionGetOutputName;
+  const auto get_type = is_input ? api_->SessionGetInputTypeInfo : api_->SessionGetOutputTypeInfo;
+  std::size_t count = 0;
+  STEMVO_ORT_TRY(get_count(session_.get(), &count));
+  if (count != 1) {
+    return fail(
+        fmt::format("{}: expected 1 {}, found {}", label_, is_input ? "input" : "output", count));
+  }
   TensorInfo info;
-  OrtAllocator* allocator = nullptr;  // the runtime's own, never freed
-  STEMVO_ORT_TRY(api_->GetAllocatorWithDefaultOptions(&allocator));
   char* name = nullptr;
-  auto* const get_name = is_input ? api_->SessionGetInputName : api_->SessionGetOutputName;
-  STEMVO_ORT_TRY(get_name(session_.get(), index, allocator, &name));
+  STEMVO_ORT_TRY(get_name(session_.get(), 0, allocator_, &name));
   info.name = name;
-  STEMVO_ORT_TRY(api_->AllocatorFree(allocator, name));
+  STEMVO_ORT_TRY(api_->AllocatorFree(allocator_, name));
 
-  OrtTypeInfo* raw_type = nullptr;
-  auto* const get_type = is_input ? api_->SessionGetInputTypeInfo : api_->SessionGetOutputTypeInfo;
-  STEMVO_ORT_TRY(get_type(session_.get(), index, &raw_type));
-  const OnnxHandle<OrtTypeInfo> type(raw_type, api_->ReleaseTypeInfo);
+  STEMVO_TRY_GET(const auto type, make(api_->ReleaseTypeInfo, get_type, session_.get(), 0U));
   ONNXType kind = ONNX_TYPE_UNKNOWN;
-  STEMVO_ORT_TRY(api_->GetOnnxTypeFromTypeInfo(raw_type, &kind));
+  STEMVO_ORT_TRY(api_->GetOnnxTypeFromTypeInfo(type.get(), &kind));
   if (kind != ONNX_TYPE_TENSOR) {
-    return info;  // described as "no tensor"
+    return info;  // of no type
   }
   const OrtTensorTypeAndShapeInfo* tensor = nullptr;  // part of `type`
-  STEMVO_ORT_TRY(api_->CastTypeInfoToTensorInfo(raw_type, &tensor));
+  STEMVO_ORT_TRY(api_->CastTypeInfoToTensorInfo(type.get(), &tensor));
   std::size_t rank = 0;
   STEMVO_ORT_TRY(api_->GetTensorElementType(tensor, &info.type));
   STEMVO_ORT_TRY(api_->GetDimensionsCount(tensor, &rank));
@@ -140,55 +140,39 @@ Expected<OnnxSession::TensorInfo> OnnxSession::read_tensor_info(bool is_input,
   return info;
 }
 
-Status OnnxSession::check_input() {
-  std::size_t inputs = 0;
-  STEMVO_ORT_TRY(api_->SessionGetInputCount(session_.get(), &inputs));
-  if (inputs != 1) {
-    return fail(fmt::format("{}: expected 1 input, found {}", label_, inputs));
-  }
-  STEMVO_TRY_GET(const auto input, read_tensor_info(true, 0));
+Status OnnxSession::check_tensors() {
+  STEMVO_TRY_GET(const auto input, read_tensor_info(true));
   const bool is_gray = input.is_float({1, 1, -1, -1});
   if (input.name != kInputName || (!is_gray && !input.is_float({1, 3, -1, -1}))) {
     return fail(fmt::format("{}: expected input '{} float 1x3xHxW' or 1x1xHxW, found '{}'", label_,
                             kInputName, input.describe()));
+  }
+  STEMVO_TRY_GET(const auto output, read_tensor_info(false));
+  if (!output.is_float({1, -1, -1, -1}) || output.shape[1] < 1) {
+    return fail(fmt::format("{}: expected output 'float 1xCxhxw' with C known, found '{}'", label_,
+                            output.describe()));
   }
   const auto side_of = [&](std::size_t axis) {
     return static_cast<int>(std::clamp<std::int64_t>(input.shape[axis], 0, INT_MAX));
   };
   num_planes_ = is_gray ? 1 : 3;
   fixed_size_ = {side_of(3), side_of(2)};
-  return {};
-}
-
-Status OnnxSession::check_output() {
-  std::size_t outputs = 0;
-  STEMVO_ORT_TRY(api_->SessionGetOutputCount(session_.get(), &outputs));
-  if (outputs != 1) {
-    return fail(fmt::format("{}: expected 1 output, found {}", label_, outputs));
-  }
-  STEMVO_TRY_GET(const auto output, read_tensor_info(false, 0));
-  if (!output.is_float({1, -1, -1, -1}) || output.shape[1] < 1) {
-    return fail(fmt::format("{}: expected output 'float 1xCxhxw' with C known, found '{}'", label_,
-                            output.describe()));
-  }
   output_ = output.name;
   num_filters_ = static_cast<int>(output.shape[1]);
   return {};
 }
 
-Expected<std::optional<std::string>> OnnxSession::metadata(const std::string& key) const {
-  OrtAllocator* allocator = nullptr;  // the runtime's own, never freed
-  STEMVO_ORT_TRY(api_->GetAllocatorWithDefaultOptions(&allocator));
-  OrtModelMetadata* raw = nullptr;
-  STEMVO_ORT_TRY(api_->SessionGetModelMetadata(session_.get(), &raw));
-  const OnnxHandle<OrtModelMetadata> metadata(raw, api_->ReleaseModelMetadata);
+Expected<std::string> OnnxSession::metadata(const std::string& key) const {
+  STEMVO_TRY_GET(const auto metadata,
+                 make(api_->ReleaseModelMetadata, api_->SessionGetModelMetadata, session_.get()));
   char* value = nullptr;
-  STEMVO_ORT_TRY(api_->ModelMetadataLookupCustomMetadataMap(raw, allocator, key.c_str(), &value));
+  STEMVO_ORT_TRY(
+      api_->ModelMetadataLookupCustomMetadataMap(metadata.get(), allocator_, key.c_str(), &value));
   if (value == nullptr) {
-    return std::optional<std::string>();
+    return std::string();
   }
-  std::optional<std::string> copy = value;
-  STEMVO_ORT_TRY(api_->AllocatorFree(allocator, value));
+  const std::string copy = value;
+  STEMVO_ORT_TRY(api_->AllocatorFree(allocator_, value));
   return copy;
 }
 
@@ -198,12 +182,10 @@ Expected<OnnxHandle<OrtValue>> OnnxSession::make_tensor(const float* data,
   const std::array<std::int64_t, 4> shape = {1, num_planes, size.height, size.width};
   const std::size_t num_bytes =
       static_cast<std::size_t>(num_planes) * static_cast<std::size_t>(size.area()) * sizeof(float);
-  OrtValue* raw = nullptr;
   // The table knows no constant data; the runtime only reads its inputs.
-  STEMVO_ORT_TRY(api_->CreateTensorWithDataAsOrtValue(memory_.get(), const_cast<float*>(data),
-                                                      num_bytes, shape.data(), shape.size(),
-                                                      ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT, &raw));
-  return OnnxHandle<OrtValue>(raw, api_->ReleaseValue);
+  return make(api_->ReleaseValue, api_->CreateTensorWithDataAsOrtValue, memory_.get(),
+              const_cast<float*>(data), num_bytes, shape.data(), shape.size(),
+              ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT);
 }
 
 Status OnnxSession::run(const float* image,

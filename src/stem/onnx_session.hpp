@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -10,6 +9,7 @@
 
 #include "stemvo/error.hpp"
 
+struct OrtAllocator;
 struct OrtApi;
 struct OrtEnv;
 struct OrtMemoryInfo;
@@ -34,8 +34,8 @@ class OnnxSession {
   [[nodiscard]] static Expected<OnnxSession> create(const std::string& label,
                                                     std::string_view model);
 
-  /// The model's metadata_props under this key; nullopt: none.
-  [[nodiscard]] Expected<std::optional<std::string>> metadata(const std::string& key) const;
+  /// The model's metadata_props under this key; empty: none.
+  [[nodiscard]] Expected<std::string> metadata(const std::string& key) const;
   /// Planes of the image: 3 or 1.
   [[nodiscard]] int num_planes() const { return num_planes_; }
   [[nodiscard]] int num_filters() const { return num_filters_; }
@@ -56,10 +56,14 @@ class OnnxSession {
   explicit OnnxSession(const std::string& label) : label_(label) {}
   [[nodiscard]] Status to_status(OrtStatus* raw) const;
   [[nodiscard]] Status load(std::string_view model);
-  [[nodiscard]] Status check_input();
-  [[nodiscard]] Status check_output();
-  /// Input (or output) number `index` of the graph.
-  [[nodiscard]] Expected<TensorInfo> read_tensor_info(bool is_input, std::size_t index) const;
+  [[nodiscard]] Status check_tensors();
+  /// The graph's input or output. Error: it has more or none.
+  [[nodiscard]] Expected<TensorInfo> read_tensor_info(bool is_input) const;
+  /// What a function of the runtime's table makes of the rest.
+  template <typename T, typename Create, typename... Given>
+  [[nodiscard]] Expected<OnnxHandle<T>> make(void (*release)(T*),
+                                             Create call,
+                                             Given... given) const;
   /// Around the caller's memory.
   [[nodiscard]] Expected<OnnxHandle<OrtValue>> make_tensor(const float* data,
                                                            int num_planes,
@@ -67,6 +71,7 @@ class OnnxSession {
 
   std::string label_;
   const OrtApi* api_ = nullptr;
+  OrtAllocator* allocator_ = nullptr;         // the runtime's own, never freed
   OnnxHandle<OrtEnv> env_{nullptr, nullptr};  // must outlive the session: declared before it
   OnnxHandle<OrtMemoryInfo> memory_{nullptr, nullptr};
   OnnxHandle<OrtSession> session_{nullptr, nullptr};

@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <opencv2/imgproc.hpp>
 
 #include "internal_check.hpp"
@@ -33,21 +32,14 @@ Expected<int> choose_filter(int asked, const std::string& of, int num_filters, i
 /// 0 stands for every second pixel, where the stride allows it: a keypoint on a coarser channel is
 /// worth too many pixels. Error: not a divisor, or a layer that allows its own stride only.
 Expected<int> choose_sampling(int asked, int stride, bool native_only) {
-  std::vector<int> allowed;
-  for (int i = native_only ? stride : 1; i <= stride; ++i) {
-    if (stride % i == 0) {
-      allowed.push_back(i);
-    }
-  }
   if (asked == 0) {
     return native_only ? stride : std::gcd(stride, 2);
   }
-  if (std::ranges::find(allowed, asked) != allowed.end()) {
+  if (native_only ? asked == stride : asked > 0 && stride % asked == 0) {
     return asked;
   }
-  return fail(fmt::format(
-      "stem.sampling_px: expected {} ({} {}), found {}", fmt::join(allowed, ", "),
-      native_only ? "the model allows its stride only," : "divisors of the stride", stride, asked));
+  return fail(fmt::format("stem.sampling_px: expected the model's stride {}{}, found {}", stride,
+                          native_only ? "" : " or a divisor of it", asked));
 }
 
 /// The default network's default filter has a file of its own, which takes a fraction of the time.
@@ -68,12 +60,8 @@ Expected<std::vector<Channel>> apply_enlarged(
   }
   cv::Mat enlarged;
   cv::resize(frame, enlarged, {}, zoom, zoom, cv::INTER_CUBIC);
-  auto channels = bank(enlarged, first, last);
-  if (!channels) {
-    return fail(fmt::format("{} (a frame of {}x{} enlarged {} times)", channels.error().message,
-                            frame.cols, frame.rows, zoom));
-  }
-  for (Channel& channel : *channels) {
+  STEMVO_TRY_GET(auto channels, bank(enlarged, first, last));
+  for (Channel& channel : channels) {
     channel.map.scale /= zoom;
     channel.map.offset_px = ((channel.map.offset_px.array() + 0.5) / zoom - 0.5).matrix();
   }

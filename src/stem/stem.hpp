@@ -55,7 +55,7 @@ class Stem {
   /// Loads and checks a model, for `apply` alone: of the default one the default filter's own file.
   /// Errors: no such model, not ONNX, no metadata that say kernel, stride and padding, or others
   /// than the graph's, inputs or outputs other than 1x3xHxW or 1x1xHxW -> 1xCxhxw float, filter
-  /// outside [0, C), sampling_px not a divisor of the stride (lists the allowed values).
+  /// outside [0, C), sampling_px not a divisor of the stride.
   /// `num_threads`: of OpenCV's, that may work on a frame at a time; 0: all it has.
   [[nodiscard]] static Expected<Stem> load(const StemOptions& options, int num_threads = 0) {
     return create(options, /*all_filters=*/false, num_threads);
@@ -102,9 +102,6 @@ class Stem {
 [[nodiscard]] TrackingResolution choose_tracking_resolution(TrackingResolution asked,
                                                             FeatureMethod method,
                                                             const Camera& camera);
-
-/// Input pixels per pixel of the image made from a channel of `sampling_px`.
-[[nodiscard]] int image_sampling_px(TrackingResolution resolution, int sampling_px);
 
 /// Float channel -> 8-bit image: percentile limits that change slowly along the drive, so that a
 /// patch keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that

@@ -308,7 +308,7 @@ TEST_F(PipelineRun, WrongRequestsAreFoundBeforeWorkStarts) {
   request = request_;
   request.config.scale_choice = ScaleChoice::kGroundTruth;
   fs::remove(folder_ / "poses/07.txt");
-  EXPECT_THAT(error_of(request), HasSubstr("poses/07.txt: expected a pose file"));
+  EXPECT_THAT(error_of(request), HasSubstr("expected a true pose of every frame"));
   EXPECT_FALSE(fs::exists(request_.out_dir));
   request = request_;
   request.out_dir = request_.sequence_dir / "calib.txt";
@@ -319,12 +319,12 @@ TEST_F(PipelineRun, OneResultThatCannotBeWrittenDoesNotLoseTheOthers) {
   request_.config.scale_choice = ScaleChoice::kOptions;
   fs::resize_file(request_.sequence_dir / "image_0/000003.png", 200);
   const auto summary = run_sequence(request_, [&](std::size_t, std::size_t) {
-    fs::create_directories(request_.out_dir / "trajectory_tum.txt.unfinished");
+    fs::create_directories(request_.out_dir / "trajectory_map_tum.txt.unfinished");
     fs::create_directories(request_.out_dir / "report.html");
     return true;
   });
   ASSERT_FALSE(summary->written);
-  EXPECT_THAT(summary->written.error().message, HasSubstr("trajectory_tum.txt"));
+  EXPECT_THAT(summary->written.error().message, HasSubstr("trajectory_map_tum.txt"));
   EXPECT_THAT(summary->warnings, ElementsAre(HasSubstr("000003.png")));
   EXPECT_EQ(read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt")->size(), 6U);
   EXPECT_TRUE(fs::is_regular_file(request_.out_dir / "metrics.json"));

@@ -42,7 +42,7 @@ FrameResult tracked() {
 }
 
 TEST(FramesCsv, HoldsOneRowPerFrame) {
-  EXPECT_EQ(frames_csv_header(), kHeader);
+  EXPECT_EQ(kFramesCsvHeader, kHeader);
   EXPECT_EQ(frames_csv_row(100, 10.3622, FrameResult(), Rigid3()) +
                 frames_csv_row(101, 10.466, tracked(), kPose),
             "100,10.3622,first,0,0,0.000,0.000,0.0000,none,0.000,0.000,0.000,,disabled,0.00,0."

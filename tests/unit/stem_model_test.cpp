@@ -112,18 +112,19 @@ TEST(OnnxSession, RefusesOperatorsOfOthers) {
 TEST(OnnxSession, RefusesOtherInputsAndOutputs) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"wrong_input_name",
-       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'x float 1x3x?x?'"},
+       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'x float 1x3x-1x-1'"},
       {"wrong_two_outputs", "expected 1 output, found 2"},
-      {"wrong_rank", "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image float 3x?x?'"},
+      {"wrong_rank",
+       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image float 3x-1x-1'"},
       {"wrong_planes",
-       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image float 1x2x?x?'"},
+       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image float 1x2x-1x-1'"},
       {"wrong_type",
-       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image no float 1x3x?x?'"},
+       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image no float 1x3x-1x-1'"},
       {"wrong_free_filters",
-       "expected output 'float 1xCxhxw' with C known, found 'channels float 1x?x?x?'"},
+       "expected output 'float 1xCxhxw' with C known, found 'channels float 1x-1x-1x-1'"},
       {"wrong_two_inputs", "expected 1 input, found 2"},
       {"wrong_output_rank",
-       "expected output 'float 1xCxhxw' with C known, found 'channels float 1x?x?'"},
+       "expected output 'float 1xCxhxw' with C known, found 'channels float 1x-1x-1'"},
   };
   for (const auto& [name, message] : cases) {
     EXPECT_EQ(session_error(name), name + ": " + message);

@@ -165,14 +165,14 @@ TEST(StemErrors, FilterAndSamplingNameTheAllowedValues) {
   EXPECT_EQ(error_of(plain, -2), "stem.filter: expected 0 to 2 for " + plain + ", found -2");
   EXPECT_EQ(error_of("gray", 1), "stem.filter: expected 0 to 0 for gray, found 1");
   EXPECT_EQ(error_of("input_layer", 3), "stem.filter: expected 0 to 2 for input_layer, found 3");
-  const std::string divisors = "stem.sampling_px: expected 1, 2, 4 (divisors of the stride 4)";
+  const std::string divisors = "stem.sampling_px: expected the model's stride 4 or a divisor of it";
   for (const int sampling : {3, 8, -1}) {
     EXPECT_EQ(error_of(plain, 0, sampling), divisors + ", found " + std::to_string(sampling));
   }
   EXPECT_EQ(error_of("gray", 0, 2),
-            "stem.sampling_px: expected 1 (divisors of the stride 1), found 2");
+            "stem.sampling_px: expected the model's stride 1 or a divisor of it, found 2");
   EXPECT_EQ(error_of(tiny_model("deep_k12s4"), 0, 2),
-            "stem.sampling_px: expected 4 (the model allows its stride only, 4), found 2");
+            "stem.sampling_px: expected the model's stride 4, found 2");
 }
 
 TEST(StemErrors, SmallFramesAndFixedSizes) {
@@ -183,7 +183,7 @@ TEST(StemErrors, SmallFramesAndFixedSizes) {
               HasSubstr("expected frames of at least 4x4, found 9x3"));
   EXPECT_EQ(stem.frame_zoom(TrackingResolution::kInputZoomed), 2);
   EXPECT_THAT(stem.apply(cv::Mat1b(1, 9, 1), 2).error().message,
-              AllOf(HasSubstr("at least 4x4, found 18x2"), HasSubstr("a frame of 9x1 enlarged")));
+              HasSubstr("at least 4x4, found 18x2"));
   const Stem fixed = make_stem(kFixed4, 2);
   EXPECT_EQ(fixed.frame_zoom(TrackingResolution::kInputZoomed), 1);
   EXPECT_EQ(fixed.apply(cv::Mat1b(32, 48, 1))->values.size(), cv::Size(23, 15));
