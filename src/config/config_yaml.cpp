@@ -194,12 +194,8 @@ std::string format(double value) {
 }
 
 std::string format(const std::string& value) {
-  constexpr std::string_view kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-";
-  const bool is_plain = value.find_first_not_of(kPlain) == std::string::npos && !value.empty() &&
-                        value[0] != '-' && !YAML::IsNullString(value);
   YAML::Emitter out;
-  out << (is_plain ? YAML::Auto : YAML::DoubleQuoted) << value;
+  out << value;
   return out.c_str();
 }
 
