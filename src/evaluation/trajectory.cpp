@@ -4,15 +4,13 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <iterator>
-#include <numeric>
 #include <optional>
 #include <regex>
 #include <string>
 #include <string_view>
 
-#include <fmt/core.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "text/text_file.hpp"
 #include "try.hpp"
@@ -121,31 +119,28 @@ Expected<TimedPose> pose_from_quaternion_row(const std::vector<double>& n) {
   return TimedPose{n[0], Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3]))};
 }
 
-/// The columns of the pose as a row of TUM's, whose quaternion ends with w. Those behind it
-/// (velocity, biases) are not read.
-Expected<std::string> to_tum_row(std::string_view line) {
-  const std::vector<std::string_view> words = split_words(line);
-  if (words.size() < 8) {
-    return fail(
-        fmt::format("expected time, x, y, z, qw, qx, qy, qz, .., found {} numbers", words.size()));
-  }
-  return fmt::format("{} {} {} {} {} {} {} {}", words[0], words[1], words[2], words[3], words[5],
-                     words[6], words[7], words[4]);
-}
-
+/// Of EuRoC's, whose quaternion begins with w, the columns behind the pose (velocity, biases) are
+/// not read.
 Expected<TimedPose> parse_row(Format format, std::string_view given) {
   // Fewer commas are those of decimals.
   const bool has_commas = format != Format::kKitti || std::ranges::count(given, ',') == 11;
-  const std::string line = has_commas ? with_blanks(given) : std::string(given);
+  std::string line = has_commas ? with_blanks(given) : std::string(given);
   if (format == Format::kKitti) {
     return parse_numbers(line, 12).and_then(pose_from_rows).map([](const Rigid3& pose) {
       return TimedPose{0.0, pose};
     });
   }
-  return (format == Format::kEuroc
-              ? to_tum_row(line).and_then([](const auto& row) { return parse_numbers(row, 8); })
-              : parse_numbers(line, 8))
-      .and_then(pose_from_quaternion_row);
+  if (format == Format::kEuroc) {
+    std::vector<std::string_view> words = split_words(line);
+    if (words.size() < 8) {
+      return fail(fmt::format("expected time, x, y, z, qw, qx, qy, qz, .., found {} numbers",
+                              words.size()));
+    }
+    words.resize(8);
+    std::rotate(words.begin() + 4, words.begin() + 5, words.end());
+    line = fmt::format("{}", fmt::join(words, " "));
+  }
+  return parse_numbers(line, 8).and_then(pose_from_quaternion_row);
 }
 
 Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Format format) {
@@ -155,7 +150,7 @@ Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Forma
   while (!lines.empty() && is_blank(lines.back())) {
     lines.pop_back();
   }
-  PoseFile result{.file = file, .is_of_body = format == Format::kEuroc};
+  std::vector<TimedPose> rows;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const std::string_view line =
         format == Format::kKitti ? lines[i] : lines[i].substr(0, lines[i].find('#'));
@@ -166,29 +161,21 @@ Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Forma
     if (!row) {
       return fail_at(file, i, row.error());
     }
-    result.poses.push_back(row->pose);
-    if (format != Format::kKitti) {
-      result.timestamps_s.push_back(unit_s * row->time);
-    }
+    rows.push_back(*row);
   }
-  if (result.poses.empty()) {
+  if (rows.empty()) {
     return fail(fmt::format("{}: expected at least one pose, found none", file.string()));
   }
-  return result;
-}
-
-/// Files that were put together by hand are not always in order.
-void sort_by_time(PoseFile& file) {
-  std::vector<double>& times_s = file.timestamps_s;
-  if (std::is_sorted(times_s.begin(), times_s.end())) {
-    return;
+  // Files that were put together by hand are not always in order.
+  std::ranges::stable_sort(rows, {}, &TimedPose::time);
+  PoseFile result{.file = file, .is_of_body = format == Format::kEuroc};
+  for (const TimedPose& row : rows) {
+    result.poses.push_back(row.pose);
+    if (format != Format::kKitti) {
+      result.timestamps_s.push_back(unit_s * row.time);
+    }
   }
-  std::vector<std::size_t> order(times_s.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return times_s[a] < times_s[b]; });
-  file.poses = take_poses(file.poses, order);
-  std::sort(times_s.begin(), times_s.end());
+  return result;
 }
 
 Error either_format(const fs::path& file, std::string_view found) {
@@ -284,14 +271,9 @@ Trajectory rescale_steps(const PosePairs& pairs) {
 }
 
 std::string kitti_row(const Rigid3& world_from_camera) {
-  const Matrix34d matrix = world_from_camera.matrix();
-  std::string text;
-  for (int i = 0; i < 12; ++i) {
-    // + 0.0 turns -0 into 0.
-    fmt::format_to(std::back_inserter(text), "{:.12e}{}", matrix(i / 4, i % 4) + 0.0,
-                   i == 11 ? '\n' : ' ');
-  }
-  return text;
+  // + 0.0 turns -0 into 0.
+  const Eigen::Array<double, 3, 4, Eigen::RowMajor> rows = world_from_camera.matrix().array() + 0.0;
+  return fmt::format("{:.12e}\n", fmt::join(rows.data(), rows.data() + 12, " "));
 }
 
 std::string tum_row(double timestamp_s, const Rigid3& world_from_camera) {
@@ -335,7 +317,6 @@ Expected<PoseFile> read_pose_file(const fs::path& file) {
   }
   Expected<PoseFile> result = parse_rows(file, text, *format);
   if (result) {
-    sort_by_time(*result);
     STEMVO_TRY(check_steps(file, *format, result->timestamps_s));
   }
   return result;
