@@ -206,16 +206,21 @@ Status check_size(const cv::Size& found,
                                 found.width, found.height));
 }
 
-Expected<FrameView> view_of(const Camera& camera, const fs::path& camera_file) {
-  auto view = FrameView::create(camera);
-  return view ? view : fail(camera_file.string() + ": " + view.error().message);
-}
-
-Status add_view(FrameSource& frames,
-                const FrameView& view,
-                const std::vector<std::string>& masks,
-                std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
+Expected<FrameView> add_view(FrameSource& frames,
+                             const CameraFile& camera,
+                             const fs::path& camera_file,
+                             const std::vector<std::string>& masks,
+                             std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
+  const auto made = FrameView::create(camera.camera);
+  if (!made) {
+    return fail(camera_file.string() + ": " + made.error().message);
+  }
+  const FrameView& view = *made;
   STEMVO_TRY_GET(const auto mask, make_mask(masks, view.full_size()));
+  frames.given_calibration = camera_file;
+  frames.camera_height_m = camera.camera_height_m;
+  frames.camera_from_imu = camera.camera_from_imu();
+  frames.imu_from_camera_s = camera.imu_from_camera_s;
   frames.mask = view.apply_to_mask(mask);
   frames.full_size = view.full_size();
   frames.camera = view.camera();
@@ -224,7 +229,7 @@ Status add_view(FrameSource& frames,
     return read_whole(index).map(
         [&](const cv::Mat& image) { return image.empty() ? image : view.apply(image); });
   };
-  return {};
+  return view;
 }
 
 Expected<SharedKind> vote_on_images(FrameSource& frames) {
@@ -373,16 +378,12 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
   add_line(frames.warnings, listing.warning);
   STEMVO_TRY_GET(const auto kind, vote_on_images(frames));
   STEMVO_TRY(check_size(kind.size, camera_file.camera, listing.folder.string(), *camera_path));
-  STEMVO_TRY_GET(const auto view, view_of(camera_file.camera, *camera_path));
   frames.kind = listing.kind;
   frames.name = listing.name;
-  frames.given_calibration = camera_path;
-  frames.camera_height_m = camera_file.camera_height_m;
-  frames.camera_from_imu = camera_file.camera_from_imu();
-  frames.imu_from_camera_s = camera_file.imu_from_camera_s;
-  STEMVO_TRY(add_view(frames, view, request.masks, [files = frames.files, kind](std::size_t i) {
+  const auto read = [files = frames.files, kind](std::size_t i) {
     return io::read_image(files[i], kind.is_color, kind.size, kind.levels);
-  }));
+  };
+  STEMVO_TRY(add_view(frames, camera_file, *camera_path, request.masks, read));
   return frames;
 }
 

@@ -249,7 +249,6 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   const std::string owner = without_secrets(request.sequence_dir.string());
   const FrameRangeRequest range = request.frames.value_or(FrameRangeRequest{});
   STEMVO_TRY(check_size(stream->decoder().size, camera.camera, owner, *request.camera_file));
-  STEMVO_TRY_GET(const FrameView view, view_of(camera.camera, *request.camera_file));
   if (const auto& rate_hz = camera.rate_hz ? camera.rate_hz : request.rate_hz) {
     stream->set_counted_rate(*rate_hz);
   }
@@ -272,8 +271,6 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                              [stream] { return stream->num_counted(); },
                              stream->rate_hz(),
                              stream->counted_hz()};
-  frames.given_calibration = request.camera_file;
-  frames.camera_height_m = camera.camera_height_m;
   frames.warnings = camera.warnings;
   add_line(frames.warnings, warn_of_turn(*stream, owner));
   constexpr double kAlike = 0.05;
@@ -294,8 +291,6 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
         "{}: of {} bits per gray level the upper 8 are taken; images of 16 bits are read whole",
         owner, stream->decoder().gray_bits));
   }
-  frames.camera_from_imu = camera.camera_from_imu();
-  frames.imu_from_camera_s = camera.imu_from_camera_s;
   if (request.ground_truth) {
     STEMVO_TRY_GET(const auto truth, read_truth(*request.ground_truth, request.camera_file));
     STEMVO_TRY(check_length(truth, frames, request));
@@ -317,7 +312,7 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
     }
     return image;
   };
-  STEMVO_TRY(add_view(frames, view, request.masks, read));
+  STEMVO_TRY(add_view(frames, camera, *request.camera_file, request.masks, read));
   return frames;
 }
 
