@@ -90,49 +90,6 @@ std::string stem_of(const std::filesystem::path& path) {
   return way < end ? std::filesystem::path(address.substr(way, end - way)).stem().string() : "";
 }
 
-Expected<std::shared_ptr<VideoStream>> open_file(const fs::path& file, const cv::Size& size) {
-  std::error_code code;
-  // A relative path with a colon would be taken for an address.
-  STEMVO_TRY_GET(auto decoder, open_decoder(fs::absolute(file, code).c_str(), 0, size));
-  if (!decoder) {
-    return fail(fmt::format(
-        "{}: expected a video that FFmpeg can decode, found a file it cannot (cut off, damaged, or "
-        "no video)",
-        file.string()));
-  }
-  std::ifstream boxes(file, std::ios::binary);
-  if (is_mirrored(boxes, static_cast<std::int64_t>(fs::file_size(file, code)))) {
-    return fail(
-        fmt::format("{}: expected a video that players do not mirror, found one that asks for it; "
-                    "'ffmpeg -i IN OUT.mp4' writes frames as players show them",
-                    file.string()));
-  }
-  return std::make_shared<VideoStream>(*std::move(decoder), file.string(), false);
-}
-
-Expected<std::shared_ptr<VideoStream>> open_address(const std::string& address,
-                                                    const cv::Size& size) {
-  STEMVO_TRY_GET(auto decoder, open_decoder(address.c_str(), 0, size));
-  const std::string name = without_secrets(address);
-  if (!decoder || decoder->size.empty()) {
-    return fail(
-        fmt::format("{}: expected a stream of pictures that FFmpeg can decode, found none", name));
-  }
-  const bool is_live = !(decoder->frame_count > 0.0);
-  return std::make_shared<VideoStream>(*std::move(decoder), name, is_live);
-}
-
-Expected<std::shared_ptr<VideoStream>> open_camera(int number, const cv::Size& size) {
-  STEMVO_TRY_GET(auto decoder, open_decoder(nullptr, number, size));
-  if (!decoder) {
-    return fail(fmt::format(
-        "camera:{0}: expected a camera at /dev/video{0} that this user may read, found none; "
-        "'ls -l /dev/video*' lists those there are",
-        number));
-  }
-  return std::make_shared<VideoStream>(*std::move(decoder), fmt::format("camera:{}", number), true);
-}
-
 constexpr const char* kVideoModule = "libstemvo_video.so";
 
 }  // namespace
@@ -140,9 +97,32 @@ constexpr const char* kVideoModule = "libstemvo_video.so";
 Expected<std::shared_ptr<VideoStream>> VideoStream::open(const fs::path& path,
                                                          const cv::Size& size) {
   const auto number = camera_number(path);
-  return number             ? open_camera(*number, size)
-         : is_address(path) ? open_address(path.string(), size)
-                            : open_file(path, size);
+  const bool is_file = !number && !is_address(path);
+  std::error_code code;
+  // A relative path with a colon would be taken for an address.
+  const fs::path whole = is_file ? fs::absolute(path, code) : path;
+  STEMVO_TRY_GET(auto decoder,
+                 open_decoder(number ? nullptr : whole.c_str(), number.value_or(0), size));
+  const std::string name = without_secrets(path.string());
+  if (!decoder || (!number && decoder->size.empty())) {
+    return fail(fmt::format(
+        "{}: expected {}", name,
+        number    ? fmt::format("a camera at /dev/video{} that this user may read, found none; "
+                                "'ls -l /dev/video*' lists those there are",
+                                *number)
+        : is_file ? "a video that FFmpeg can decode, found a file it cannot (cut off, damaged, or "
+                    "no video)"
+                  : "a stream of pictures that FFmpeg can decode, found none"));
+  }
+  if (std::ifstream boxes(path, std::ios::binary);
+      is_file && is_mirrored(boxes, static_cast<std::int64_t>(fs::file_size(path, code)))) {
+    return fail(
+        fmt::format("{}: expected a video that players do not mirror, found one that asks for it; "
+                    "'ffmpeg -i IN OUT.mp4' writes frames as players show them",
+                    name));
+  }
+  const bool is_live = number || (!is_file && !(decoder->frame_count > 0.0));
+  return std::make_shared<VideoStream>(*std::move(decoder), name, is_live);
 }
 
 std::size_t VideoStream::expected_frames() const {
