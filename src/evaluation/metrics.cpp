@@ -13,8 +13,6 @@ namespace {
 constexpr std::size_t kFirstFrameStep = 10;  // devkit: every 10th frame starts a segment
 constexpr double kDenseShare = 1.0 / 8.0;    // of the path
 constexpr double kShortPath_m = 100.0;       // below it no devkit segment fits
-constexpr double kDevkitLengths_m[] = {100, 200, 300, 400, 500, 600, 700, 800};
-constexpr double kShortLengths_m[] = {10, 20, 30, 40, 50};
 
 std::vector<Eigen::Vector3d> positions(std::span<const Rigid3> poses) {
   std::vector<Eigen::Vector3d> result(poses.size());
@@ -121,10 +119,8 @@ std::vector<double> segment_lengths(const EvaluationOptions& options, double pat
   if (!options.segment_lengths_m.empty()) {
     return options.segment_lengths_m;
   }
-  if (path_length_m < kShortPath_m) {
-    return {std::begin(kShortLengths_m), std::end(kShortLengths_m)};
-  }
-  return {std::begin(kDevkitLengths_m), std::end(kDevkitLengths_m)};
+  return path_length_m < kShortPath_m ? std::vector<double>{10, 20, 30, 40, 50}
+                                      : std::vector<double>{100, 200, 300, 400, 500, 600, 700, 800};
 }
 
 }  // namespace
