@@ -2,7 +2,6 @@
 #include "evaluation/trajectory.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <optional>
 #include <regex>
@@ -53,24 +52,12 @@ std::optional<Format> format_of_commas(std::string_view row, bool says_nanosecon
 /// Names that end with w, x, .. in this order ("qw qx ..", "orientation.w orientation.x ..", "w x
 /// y z"), or are counted, whose first is w in most programs.
 bool names_w_first(std::string_view comment) {
-  std::string axes;
-  std::string name;
-  for (const char c : std::string(comment) + ' ') {
-    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
-      name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-      continue;
-    }
-    if (name == "q0") {
-      return true;
-    }
-    if (!name.empty()) {
-      const bool is_axis = name.size() == 1 || (name.size() == 2 && name.front() == 'q');
-      axes += is_axis ? name.back() : ' ';
-    }
-    name.clear();
-  }
-  static const std::regex kOrder("w[ q]{0,2}x");
-  return std::regex_search(axes, kOrder);
+  static const std::regex kOrder(
+      "(^|[^a-z0-9])(q0|q?w([^a-z0-9]+(qq?|[a-pr-z0-9][a-z0-9]|[a-z0-9]{3,})){0,2}[^a-z0-9]+q?x)"
+      "([^a-z0-9]|$)",
+      std::regex::icase);
+  const std::string start(comment.substr(0, 1000));  // longer texts take std::regex all the stack
+  return std::regex_search(start, kOrder);
 }
 
 /// Nullopt: the numbers may be of two formats, or a comment says another order.
