@@ -166,19 +166,14 @@ template std::string parse(const YAML::Node&, std::uint64_t&);
 std::string parse(const YAML::Node& node, std::vector<double>& value) {
   if (node.IsScalar()) {
     const Expected<YAML::Node> list = parse_document(node.Scalar(), "value");
-    if (list && !list->IsSequence()) {
-      return fmt::format("expected a list of numbers like [100, 200], found '{}'",
-                         one_line(node.Scalar()));
+    if (!list || list->IsSequence()) {
+      return list ? parse(*list, value) : list.error().message;
     }
-    return list ? parse(*list, value) : list.error().message;
   }
   if (!node.IsSequence()) {
-    return fmt::format("expected a list of numbers, found {}", kind_of(node));
+    return fmt::format("expected a list of numbers like [100, 200], found {}", kind_of(node));
   }
   for (const YAML::Node& element : node) {
-    if (!element.IsScalar()) {
-      return fmt::format("expected a list of numbers, found {} in it", kind_of(element));
-    }
     if (const std::string problem = parse(element, value.emplace_back()); !problem.empty()) {
       return problem;
     }
