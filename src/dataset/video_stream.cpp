@@ -101,10 +101,12 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open(const fs::path& path,
   std::error_code code;
   // A relative path with a colon would be taken for an address.
   const fs::path whole = is_file ? fs::absolute(path, code) : path;
-  STEMVO_TRY_GET(auto decoder,
-                 open_decoder(number ? nullptr : whole.c_str(), number.value_or(0), size));
+  STEMVO_TRY_GET(void* const found, io::load_symbol(kVideoModule, kOpenDecoder, "decodes videos"));
+  VideoDecoder decoder;
+  const bool is_open = reinterpret_cast<OpenDecoder*>(found)(number ? nullptr : whole.c_str(),
+                                                             number.value_or(0), size, decoder);
   const std::string name = without_secrets(path.string());
-  if (!decoder || (!number && decoder->size.empty())) {
+  if (!is_open || (!number && decoder.size.empty())) {
     return fail(fmt::format(
         "{}: expected {}", name,
         number    ? fmt::format("a camera at /dev/video{} that this user may read, found none; "
@@ -121,8 +123,8 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open(const fs::path& path,
                     "'ffmpeg -i IN OUT.mp4' writes frames as players show them",
                     name));
   }
-  const bool is_live = number || (!is_file && !(decoder->frame_count > 0.0));
-  return std::make_shared<VideoStream>(*std::move(decoder), name, is_live);
+  const bool is_live = number || (!is_file && !(decoder.frame_count > 0.0));
+  return std::make_shared<VideoStream>(std::move(decoder), name, is_live);
 }
 
 std::size_t VideoStream::expected_frames() const {
@@ -304,18 +306,6 @@ Expected<FrameSource> open_video(const FrameSourceRequest& request) {
   const auto stream = VideoStream::open(request.sequence_dir, size);
   return stream.and_then([&](const std::shared_ptr<VideoStream>& opened) {
     return open_stream(opened, camera, request);
-  });
-}
-
-Expected<std::optional<VideoDecoder>> open_decoder(const char* file,
-                                                   int number,
-                                                   const cv::Size& size) {
-  static const Expected<void*> found =
-      io::load_symbol(kVideoModule, kOpenDecoder, "decodes videos");
-  return found.map([&](void* open) {
-    std::optional<VideoDecoder> decoder(std::in_place);
-    return reinterpret_cast<OpenDecoder*>(open)(file, number, size, *decoder) ? decoder
-                                                                              : std::nullopt;
   });
 }
 
