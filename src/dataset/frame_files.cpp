@@ -54,7 +54,6 @@ Status add_part(const std::string& part, cv::Mat& mask) {
 }
 
 Expected<TimedRows<double>> find_times(const Listing& listing, const FrameSourceRequest& request) {
-  const std::size_t num_images = listing.files.size();
   const auto& file = request.times ? request.times : listing.times_file;
   if (request.rate_hz && (file || !listing.times_s.empty())) {
     return fail(fmt::format("--rate {}: expected images without times, found {}", *request.rate_hz,
@@ -63,12 +62,7 @@ Expected<TimedRows<double>> find_times(const Listing& listing, const FrameSource
   if (!file) {
     return TimedRows<double>{listing.times_s, listing.note};
   }
-  auto read = read_kitti_times(*file, num_images);
-  if (read && read->rows.size() != num_images) {
-    return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
-                            file->string(), num_images, read->rows.size()));
-  }
-  return read;
+  return read_kitti_times(*file, listing.files.size(), true);
 }
 
 /// Without times: the camera file's, else the rate asked for, else 30, with a note.

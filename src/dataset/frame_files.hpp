@@ -136,8 +136,10 @@ struct SharedKind {
                                                          const Camera& given,
                                                          const Camera& refined);
 
-/// One time per line, for at least `num_expected` images. Errors: read_timed_rows'; fewer lines.
+/// One time per line, for at least `num_expected` images, or as many if `is_exact`. Errors:
+/// read_timed_rows'; another number of lines.
 [[nodiscard]] Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
-                                                           std::size_t num_expected);
+                                                           std::size_t num_expected,
+                                                           bool is_exact = false);
 
 }  // namespace stemvo::dataset

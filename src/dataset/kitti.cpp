@@ -112,7 +112,8 @@ Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
 }
 
 Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
-                                             std::size_t num_expected) {
+                                             std::size_t num_expected,
+                                             bool is_exact) {
   STEMVO_TRY_GET(const auto found, read_timed_rows(file, {1}, "a time"));
   TimedRows<double> times{.note = found.note};
   for (const TimedRow& row : found.rows) {
@@ -125,7 +126,7 @@ Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
         "{}: times {:g}, {:g}, .. are taken for seconds; numbers of frames would be no times",
         file.string(), times.rows[0], times.rows[1]);
   }
-  if (times.rows.size() < num_expected) {
+  if (times.rows.size() < num_expected || (is_exact && times.rows.size() > num_expected)) {
     return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
                             file.string(), num_expected, times.rows.size()));
   }
