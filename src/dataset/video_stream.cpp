@@ -263,11 +263,6 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
         fmt::format("{} {}: {} says when each frame was taken, which goes before it",
                     request.rate_hz ? "--rate" : "rate_hz", *said_hz, owner));
   }
-  if (range.end && frames.stream->expected_frames > 0 && all < *range.end) {
-    frames.warnings.push_back(
-        fmt::format("--frames {}:{}: {} has {} frames, as its container counts them", range.begin,
-                    *range.end, owner, all));
-  }
   if (request.ground_truth) {
     STEMVO_TRY_GET(const auto truth, read_truth(*request.ground_truth, request.camera_file));
     STEMVO_TRY(check_length(truth, frames, request));
