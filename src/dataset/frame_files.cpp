@@ -20,17 +20,12 @@ namespace {
 
 constexpr int kBlack = 128;
 
-std::optional<cv::Rect2d> parse_rectangle(std::string part) {
-  std::ranges::replace(part, ',', ' ');
-  const auto numbers = parse_numbers(part, 4);
-  return numbers
-             ? std::optional(cv::Rect2d((*numbers)[0], (*numbers)[1], (*numbers)[2], (*numbers)[3]))
-             : std::nullopt;
-}
-
 Status add_part(const std::string& part, cv::Mat& mask) {
-  if (const auto rectangle = parse_rectangle(part)) {
-    const cv::Rect inside = *rectangle & cv::Rect2d(0, 0, mask.cols, mask.rows);
+  std::string words = part;
+  std::ranges::replace(words, ',', ' ');
+  if (const auto n = parse_numbers(words, 4)) {
+    const cv::Rect inside =
+        cv::Rect2d((*n)[0], (*n)[1], (*n)[2], (*n)[3]) & cv::Rect2d(0, 0, mask.cols, mask.rows);
     if (inside.empty()) {
       return fail(fmt::format("--mask {}: expected a rectangle inside frames of {}x{} pixels", part,
                               mask.cols, mask.rows));
