@@ -19,7 +19,32 @@ bool is_section(std::string_view name, const std::vector<Key>& keys) {
   return !name.empty() && std::ranges::find(keys, name, &Key::section) != keys.end();
 }
 
-std::string unknown_key(std::string_view section, const std::vector<Key>& keys) {
+/// Pairs of letters that two names share, of all that they have: 0 to 1.
+double likeness(std::string_view a, std::string_view b) {
+  double num_shared = 0.0;
+  for (std::size_t i = 0; i + 1 < a.size(); ++i) {
+    num_shared += b.find(a.substr(i, 2)) != std::string_view::npos ? 1.0 : 0.0;
+  }
+  return 2.0 * num_shared / static_cast<double>(std::max(a.size() + b.size(), std::size_t{3}) - 2);
+}
+
+std::string like_name(const std::string& name, const std::vector<Key>& keys) {
+  constexpr double kMinLikeness = 0.6;
+  double best = kMinLikeness;
+  std::string nearest;
+  for (const Key& key : keys) {
+    const std::string known = options::full_name(key.section, key.key);
+    if (const double found = likeness(name, known); found > best) {
+      best = found;
+      nearest = fmt::format("; did you mean {}?", known);
+    }
+  }
+  return nearest;
+}
+
+std::string unknown_key(std::string_view section,
+                        const std::string& key,
+                        const std::vector<Key>& keys) {
   const bool is_top = !is_section(section, keys);
   std::vector<std::string_view> known;
   for (const Key& other : keys) {
@@ -28,8 +53,9 @@ std::string unknown_key(std::string_view section, const std::vector<Key>& keys) 
       known.push_back(name);
     }
   }
-  return fmt::format("unknown key; known keys{}: {}", is_top ? "" : fmt::format(" of {}", section),
-                     fmt::join(known, ", "));
+  return fmt::format("unknown key; known keys{}: {}{}",
+                     is_top ? "" : fmt::format(" of {}", section), fmt::join(known, ", "),
+                     like_name(options::full_name(section, key), keys));
 }
 
 int line_of(const YAML::Node& node) { return node.Mark().line + 1; }
@@ -209,7 +235,7 @@ std::string read_key(std::string_view section,
   const auto found = std::ranges::find_if(
       keys, [&](const Key& k) { return k.section == section && k.key == key; });
   if (found == keys.end()) {
-    return unknown_key(section, keys);
+    return unknown_key(section, key, keys);
   }
   found->is_given = true;
   return found->read(value);

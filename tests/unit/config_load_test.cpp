@@ -175,6 +175,9 @@ TEST(ConfigOverride, ErrorsAreOneLineAndLeaveTheConfigAlone) {
               StartsWith("--set stem.filtre: unknown key; known keys of stem: model, "));
   EXPECT_THAT(error_of("stm=1"), AllOf(StartsWith("--set stm: unknown key; known keys: input, "),
                                        EndsWith(", scale, seed, threads")));
+  EXPECT_THAT(error_of("stem.filtre=1"), EndsWith("; did you mean stem.filter?"));
+  EXPECT_THAT(error_of("max_feature=1"), EndsWith("; did you mean features.max_features?"));
+  EXPECT_THAT(error_of("colour=1"), Not(HasSubstr("did you mean")));
   EXPECT_THAT(error_of("stem=1"), StartsWith("--set stem: unknown key; known keys: input, "));
   EXPECT_THAT(error_of("stem.filter"), HasSubstr("expected key=value"));
   EXPECT_EQ(error_of("stem.filter=a"), "--set stem.filter: expected a whole number, found 'a'");
