@@ -127,6 +127,17 @@ std::pair<double, double> span_of(const std::set<std::string>& numbers) {
   return {*values.begin(), *values.rbegin()};
 }
 
+/// Whole minutes: the numbers are seconds, which go on from one beginning to the next ("12-30-59",
+/// "12-31-00") in their usual step. `before`: one of the beginnings.
+bool are_seconds(const std::string& before, const std::set<std::string>& numbers) {
+  static const std::regex kMinute("(.*[^0-9])?([01][0-9]|2[0-3])[^0-9]?[0-5][0-9][^0-9]");
+  constexpr double kMinute_s = 60.0;
+  const auto [first, last] = span_of(numbers);
+  const double step_s = (last - first) / static_cast<double>(numbers.size() - 1);
+  return last < kMinute_s && kMinute_s + first - last < 1.5 * step_s &&
+         std::regex_match(before, kMinute);
+}
+
 /// Numbers alone ("_0", "_1") are cameras' where a few follow each other, many times: else they may
 /// be seconds.
 bool may_be_cameras(const std::set<std::string>& names, std::size_t num_moments) {
@@ -201,7 +212,7 @@ bool are_of_one_time(const std::set<std::string>& a, const std::set<std::string>
 
 /// Error: two images of one number, which are two cameras or one picture twice; or names with the
 /// same last numbers behind several beginnings (cam1_, cam2_), which are as many cameras. Where
-/// there are more beginnings than numbers, they are hours or seconds.
+/// there are more beginnings than numbers, they are hours or seconds; so are whole minutes.
 Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) {
   struct Group {
     std::set<std::string> numbers;
@@ -225,7 +236,8 @@ Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) 
     cameras[group.numbers].push_back(group.first);
   }
   for (const auto& [numbers, firsts] : cameras) {
-    if (firsts.size() > 1 && numbers.size() >= firsts.size() && numbers.size() > 1) {
+    if (firsts.size() > 1 && numbers.size() >= firsts.size() && numbers.size() > 1 &&
+        !are_seconds(parts_of(firsts[0]).before, numbers)) {
       return one_time(given, firsts[0], firsts[1]);
     }
   }

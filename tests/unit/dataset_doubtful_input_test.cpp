@@ -145,6 +145,18 @@ TEST_F(DoubtfulInput, FramesThatAreThereTwiceAreRefused) {
     }
     EXPECT_EQ(error_of(write_images(seconds)), "no error") << format;
   }
+  // Whole minutes, and as many frames of cameras whose numbers look like that.
+  for (const auto& [step, count] : {std::pair(1.0, 60), std::pair(0.5, 120), std::pair(2.0, 30)}) {
+    for (const char* format :
+         {"12-30-{:04.1f}.png", "day_2330-{:04.1f}.png", "cam2_{:04.1f}.png"}) {
+      std::vector<std::string> names;
+      for (int i = 0; i < 2 * count; ++i) {
+        std::string name = fmt::format(fmt::runtime(format), step * (i % count));
+        names.push_back(i < count ? name : name.replace(name.find_first_of("02"), 1, "1"));
+      }
+      EXPECT_EQ(error_of(write_images(names)) == "no error", *format != 'c') << names.back();
+    }
+  }
   EXPECT_THAT(
       error_of(write_images({"01_01_00.png", "01_01_01.png", "01_02_00.png", "01_02_01.png"})),
       HasSubstr("01_02_00.png"));
