@@ -2,6 +2,7 @@
 #include "dataset/image_names.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
@@ -253,6 +254,18 @@ Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) 
   return {};
 }
 
+/// All larger rises are those of a clock's digits (hhmmss, with fractions or without) into the next
+/// minute or hour.
+bool are_of_clock(const std::vector<double>& rises, double step) {
+  const auto is_of_clock = [&](double rise) {
+    const double left = rise - step;  // 40 or 4040 of the last digits before the fractions
+    return left == 0.0 || std::ranges::any_of(std::array{1.0, 1e3, 1e6, 1e9}, [&](double unit) {
+             return left == 40.0 * unit || left == 4040.0 * unit;
+           });
+  };
+  return std::ranges::max(rises) > step && std::ranges::all_of(rises, is_of_clock);
+}
+
 }  // namespace
 
 bool comes_before(std::string_view a, std::string_view b, bool has_decimals) {
@@ -285,7 +298,8 @@ std::vector<double> count_frames(const std::vector<fs::path>& files,
   }
   const double least = is_count ? std::ranges::min(rises) : 1.0;
   is_count = is_count && 2 * std::ranges::count(rises, least) >= std::ssize(rises) &&
-             std::ranges::all_of(rises, [&](double r) { return std::fmod(r, least) == 0.0; });
+             std::ranges::all_of(rises, [&](double r) { return std::fmod(r, least) == 0.0; }) &&
+             !are_of_clock(rises, least);
   std::vector<double> steps = {0.0};
   for (const double rise : rises) {
     steps.push_back(steps.back() + (is_count ? rise / least : 1.0));

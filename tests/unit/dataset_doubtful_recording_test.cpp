@@ -30,6 +30,7 @@ TEST_F(DoubtfulRecording, NumbersThatCountNoFramesAreCountedEvenly) {
   for (const auto& names : std::vector<std::vector<std::string>>{
            {"1700000000033.png", "1700000000066.png", "1700000000100.png"},
            {"12-30-58.png", "12-30-59.png", "12-31-00.png"},
+           {"20240101_120058.png", "20240101_120059.png", "20240101_120100.png"},
            {"5.1.png", "5.2.png", "5.4.png"},
            {"1.png", "8.png", "30.png", "31.png"}}) {
     const FrameSource source = open_source(write_images(names)).value();
