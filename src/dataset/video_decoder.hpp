@@ -18,6 +18,7 @@ struct VideoDecoder {
   double frame_count = 0.0;  ///< as the container says; 0 or less: it does not say
   double rate_hz = 0.0;      ///< the same
   int turned_deg = 0;        ///< how the container asked for the frames to be turned, and they were
+  unsigned gray_bits = 8;    ///< of gray levels in the file; the upper 8 are decoded
   std::function<bool()> grab = nullptr;  ///< the next frame; false: there is none
   /// The frame grabbed last: CV_8UC3, BGR; empty or of another type where it cannot be decoded.
   std::function<cv::Mat()> retrieve = nullptr;

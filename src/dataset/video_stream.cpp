@@ -263,6 +263,11 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
         fmt::format("{} {}: {} says when each frame was taken, which goes before it",
                     request.rate_hz ? "--rate" : "rate_hz", *said_hz, owner));
   }
+  if (stream->decoder().gray_bits > 8) {
+    frames.warnings.push_back(fmt::format(
+        "{}: of {} bits per gray level the upper 8 are taken; images of 16 bits are read whole",
+        owner, stream->decoder().gray_bits));
+  }
   if (request.ground_truth) {
     STEMVO_TRY_GET(const auto truth, read_truth(*request.ground_truth, request.camera_file));
     STEMVO_TRY(check_length(truth, frames, request));

@@ -23,6 +23,11 @@ VideoDecoder decoder_of(cv::VideoCapture capture, int turned_deg) {  // copies s
   decoder.frame_count = capture.get(cv::CAP_PROP_FRAME_COUNT);
   decoder.rate_hz = capture.get(cv::CAP_PROP_FPS);
   decoder.turned_deg = turned_deg;
+  const auto tag = static_cast<unsigned>(capture.get(cv::CAP_PROP_CODEC_PIXEL_FORMAT));
+  // FFmpeg's: "Y1", 0, bits; reversed where the high byte comes first.
+  decoder.gray_bits = (tag & 0xffffffU) == 0x003159U ? tag >> 24U
+                      : tag >> 8U == 0x593100U       ? tag & 0xffU
+                                                     : 8U;
   decoder.grab = [capture]() mutable { return capture.grab(); };
   decoder.position_ms = [capture] { return capture.get(cv::CAP_PROP_POS_MSEC); };
   decoder.retrieve = [capture, turned_deg]() mutable {

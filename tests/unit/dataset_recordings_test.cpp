@@ -254,6 +254,19 @@ TEST_F(Recordings, RawMotionJpegIsCountedAtTheGivenRate) {
   EXPECT_THAT(times_of("rate_hz: 10\n"), ElementsAre(0.0, near(0.1), near(0.2), 10.0));
 }
 
+TEST_F(Recordings, GrayLevelsThatAVideoLosesAreSaid) {
+  FrameSourceRequest video = request(temp_ / "gray.mkv");
+  video.camera_file = camera("");
+  const auto warnings_of = [&](int type) {  // images behind one another: FFmpeg's png_pipe
+    std::vector<unsigned char> png;
+    cv::imencode(".png", cv::Mat(kHeight_px, kWidth_px, type, cv::Scalar(50)), png);
+    (void)temp_.file("gray.mkv", std::string(png.begin(), png.end()));
+    return open_source(video)->warnings;
+  };
+  EXPECT_THAT(warnings_of(CV_8UC1), IsEmpty());
+  EXPECT_THAT(warnings_of(CV_16UC1), ElementsAre(HasSubstr("of 16 bits per gray level")));
+}
+
 TEST_F(Recordings, WhatIsNoVideoOrOfAnotherSizeIsRefused) {
   FrameSourceRequest video = request(temp_.file("notes.mp4", "no video at all\n"));
   video.camera_file = camera("");
