@@ -108,10 +108,8 @@ nb::object truth_frames_of(const FrameSource& source) {
 CameraView view_of_file(const Path& camera_file, const std::vector<std::string>& masks) {
   const auto camera = value_or_raise(dataset::read_camera_file(camera_file));
   CameraView made;
-  made.view = value_or_raise(dataset::view_of(camera.camera, camera_file));
-  made.frames.camera_height_m = camera.camera_height_m;
   made.frames.warnings = camera.warnings;
-  value_or_raise(dataset::add_view(made.frames, made.view, masks, {}));
+  made.view = value_or_raise(dataset::add_view(made.frames, camera, camera_file, masks, {}));
   for (const std::string& warning : made.frames.warnings) {
     warn(warning);
   }

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <regex>
 
 #include <dlfcn.h>
 #include <fmt/format.h>
@@ -21,14 +23,6 @@ namespace {
 constexpr const char* kForms =
     "COLUMNSxROWS:SQUARE_M (inner corners), charuco:COLUMNSxROWS:SQUARE_M:MARKER_M:DICTIONARY or "
     "aprilgrid:COLUMNSxROWS:TAG_M:GAP_M";
-
-std::vector<std::string> split(const std::string& text, char at) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    c == at ? void(parts.emplace_back()) : parts.back().push_back(c);
-  }
-  return parts;
-}
 
 cv::Point3f on_board(double x_m, double y_m) {
   return {static_cast<float>(x_m), static_cast<float>(y_m), 0.0F};
@@ -119,54 +113,38 @@ BoardPoints refined(const cv::Mat& gray,
   for (const Marker& marker : markers) {
     side_px = std::min(side_px, std::sqrt(cv::contourArea(marker.corners)));
   }
-  BoardPoints best = points;
-  double best_px = std::numeric_limits<double>::infinity();
+  std::vector<BoardPoints> tried;
   for (const double share : {0.1, 0.15, 0.2}) {
-    BoardPoints tried = points;
-    refine(gray, share * side_px, 8, tried.in_image);
-    if (const double px = misfit_px(tried); px < best_px) {
-      best_px = px;
-      best = std::move(tried);
-    }
+    refine(gray, share * side_px, 8, tried.emplace_back(points).in_image);
   }
-  return best;
+  return *std::ranges::min_element(tried, {}, misfit_px);
 }
 
 BoardPoints find_grid(const Board& board, const std::vector<Marker>& markers) {
   const int columns = board.cells.width;
   const double step_m = board.cell_m + board.other_m;
-  BoardPoints best;
-  double best_px = std::numeric_limits<double>::infinity();
+  std::vector<BoardPoints> layouts;
   for (const bool is_upwards : {false, true}) {
     for (int turn = 0; turn < 4; ++turn) {
-      BoardPoints points = corners_by(markers, [&](int id, int corner) {
+      layouts.push_back(corners_by(markers, [&](int id, int corner) {
         const int row = is_upwards ? board.cells.height - 1 - id / columns : id / columns;
         const int turned = (corner + turn) % 4;
         return on_board((id % columns) * step_m + kCornerX[turned] * board.cell_m,
                         row * step_m + kCornerY[turned] * board.cell_m);
-      });
-      if (const double px = misfit_px(points); px < best_px) {
-        best_px = px;
-        best = std::move(points);
-      }
+      }));
     }
   }
-  return best;
+  return *std::ranges::min_element(layouts, {}, misfit_px);
 }
 
-/// Squares that hold the markers, by their numbers; `parity`: which of the colours they are on.
-std::vector<cv::Point> marked_squares(const cv::Size& squares, int parity) {
-  std::vector<cv::Point> marked;
-  for (int y = 0; y < squares.height; ++y) {
-    for (int x = (y + parity) % 2; x < squares.width; x += 2) {
-      marked.emplace_back(x, y);
-    }
-  }
-  return marked;
-}
-
+/// The markers are on the squares of one colour, by their numbers; `parity` says which.
 BoardPoints charuco_markers(const Board& board, const std::vector<Marker>& markers, int parity) {
-  const std::vector<cv::Point> squares = marked_squares(board.cells, parity);
+  std::vector<cv::Point> squares;
+  for (int y = 0; y < board.cells.height; ++y) {
+    for (int x = (y + parity) % 2; x < board.cells.width; x += 2) {
+      squares.emplace_back(x, y);
+    }
+  }
   const double margin_m = 0.5 * (board.cell_m - board.other_m);
   return corners_by(markers, [&](int id, int corner) {
     const cv::Point& square = squares[static_cast<std::size_t>(id) % squares.size()];
@@ -179,8 +157,7 @@ BoardPoints charuco_markers(const Board& board, const std::vector<Marker>& marke
 BoardPoints find_charuco(const Board& board, const std::vector<Marker>& markers) {
   const BoardPoints choices[] = {charuco_markers(board, markers, 1),
                                  charuco_markers(board, markers, 0)};
-  const BoardPoints& known =
-      misfit_px(choices[0]) <= misfit_px(choices[1]) ? choices[0] : choices[1];
+  const BoardPoints& known = *std::ranges::min_element(choices, {}, misfit_px);
   BoardPoints points;
   for (int y = 1; y < board.cells.height; ++y) {
     for (int x = 1; x < board.cells.width; ++x) {
@@ -249,38 +226,33 @@ Expected<std::vector<Marker>> find_markers(const cv::Mat& gray, const std::strin
 }  // namespace
 
 Expected<Board> parse_board(const std::string& text) {
-  std::vector<std::string> parts = split(text, ':');
+  static const std::regex kForm(
+      "(charuco:|aprilgrid:)?([0-9]{1,3})x([0-9]{1,3})"
+      ":([^:]{1,40})(?::([^:]{1,40}))?(?::([^:]{1,40}))?");
+  std::smatch part;
   Board board;
-  if (parts.size() > 1 && (parts.front() == "charuco" || parts.front() == "aprilgrid")) {
-    board.kind = parts.front() == "charuco" ? Board::Kind::kCharuco : Board::Kind::kAprilGrid;
-    board.dictionary = board.kind == Board::Kind::kAprilGrid ? "DICT_APRILTAG_36h11" : "";
-    parts.erase(parts.begin());
-    if (parts.size() == 4) {
-      board.dictionary = parts.back();
-      parts.pop_back();
-    }
+  if (std::regex_match(text, part, kForm)) {
+    const auto number = [&](std::size_t i) {
+      return parse_numbers(part[i].str(), 1).value_or(std::vector{0.0}).front();
+    };
+    board.kind = part[1] == "charuco:"     ? Board::Kind::kCharuco
+                 : part[1] == "aprilgrid:" ? Board::Kind::kAprilGrid
+                                           : Board::Kind::kChessboard;
+    board.cells = {std::stoi(part[2]), std::stoi(part[3])};
+    board.cell_m = number(4);
+    board.other_m = number(5);
+    const bool is_usual = board.kind == Board::Kind::kAprilGrid && !part[6].matched;
+    board.dictionary = is_usual ? "DICT_APRILTAG_36h11" : part[6].str();
   }
   const bool is_plain = board.kind == Board::Kind::kChessboard;
-  const std::vector<std::string> sides = split(parts.front(), 'x');
-  constexpr std::size_t kMost = 100;
-  const auto columns = parse_index(sides.front());
-  const auto rows = parse_index(sides.back());
-  const std::size_t least = is_plain ? 3 : 2;
-  const auto cell = parts.size() == (is_plain ? 2 : 3) ? parse_numbers(parts[1], 1) : fail("");
-  const auto other =
-      is_plain ? Expected<std::vector<double>>({0.0}) : parse_numbers(parts.back(), 1);
-  const bool is_sound = sides.size() == 2 && columns && rows &&
-                        std::min(*columns, *rows) >= least && std::max(*columns, *rows) <= kMost &&
-                        cell && cell->front() > 0.0 && other &&
-                        (is_plain || other->front() > 0.0) &&
+  const auto [fewer, more] = std::minmax({board.cells.width, board.cells.height});
+  const bool is_sound = fewer >= (is_plain ? 3 : 2) && more <= 100 && board.cell_m > 0.0 &&
+                        (is_plain ? !part[5].matched : board.other_m > 0.0) &&
                         (board.kind != Board::Kind::kCharuco ||
-                         (other->front() < cell->front() && !board.dictionary.empty()));
+                         (board.other_m < board.cell_m && !board.dictionary.empty()));
   if (!is_sound) {
     return fail(fmt::format("--board: expected {}, found '{}'", kForms, one_line(text)));
   }
-  board.cells = {static_cast<int>(*columns), static_cast<int>(*rows)};
-  board.cell_m = cell->front();
-  board.other_m = other->front();
   return board;
 }
 

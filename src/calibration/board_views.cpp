@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstdint>
+#include <iterator>
 #include <limits>
 
 #include <fmt/format.h>
@@ -71,17 +72,23 @@ BoardView* find_odd(const std::vector<BoardView*>& views) {
   return views.size() > kMinViews && worst->error_px > limit_px ? worst : nullptr;
 }
 
+/// The board's normal, in the camera's axes.
+cv::Vec3d normal_of(const BoardView& view) {
+  cv::Matx33d rotation;
+  cv::Rodrigues(view.camera_from_board_r, rotation);
+  return {rotation(0, 2), rotation(1, 2), rotation(2, 2)};
+}
+
 /// The largest angle between two of the boards' normals, about: rad.
 double spread_of_tilts(const std::vector<BoardView*>& views) {
   const cv::Vec3d least(-1.0, -1.0, -1.0);
   cv::Vec3d low = -least;
   cv::Vec3d high = least;
   for (const BoardView* view : views) {
-    cv::Matx33d rotation;
-    cv::Rodrigues(view->camera_from_board_r, rotation);
+    const cv::Vec3d normal = normal_of(*view);
     for (int i = 0; i < 3; ++i) {
-      low[i] = std::min(low[i], rotation(i, 2));
-      high[i] = std::max(high[i], rotation(i, 2));
+      low[i] = std::min(low[i], normal[i]);
+      high[i] = std::max(high[i], normal[i]);
     }
   }
   return cv::norm(high - low);
@@ -123,32 +130,27 @@ Expected<BoardFit> check_fit(const BoardFit& fit,
 constexpr int kColumns = 9;  ///< of cells; three to a part of the image
 constexpr int kRows = 6;     ///< two to a part
 
-using Cells = std::array<std::array<bool, kColumns>, kRows>;
-
-Cells covered_cells(const std::vector<BoardView>& views, const cv::Size& size) {
-  Cells cells = {};
+/// Not 0 where there are corners.
+cv::Mat1b covered_cells(const std::vector<BoardView>& views, const cv::Size& size) {
+  cv::Mat1b cells(kRows, kColumns, std::uint8_t{0});
   for (const BoardView& view : views) {
     for (const cv::Point2f& corner : view.points.in_image) {
       const int x = std::clamp(static_cast<int>(corner.x * kColumns / size.width), 0, kColumns - 1);
       const int y = std::clamp(static_cast<int>(corner.y * kRows / size.height), 0, kRows - 1);
-      cells[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] |= view.is_used;
+      cells(y, x) |= view.is_used ? 1 : 0;
     }
   }
   return cells;
 }
 
 /// Parts of the image, of nine, less than half of which have corners.
-std::vector<std::string> empty_parts(const Cells& cells) {
+std::vector<std::string> empty_parts(const cv::Mat1b& cells) {
   constexpr const char* kAcross[] = {"left", "middle", "right"};
   constexpr const char* kDown[] = {"upper", "middle", "lower"};
   std::vector<std::string> parts;
-  for (std::size_t row = 0; row < 3; ++row) {
-    for (std::size_t column = 0; column < 3; ++column) {
-      int count = 0;
-      for (std::size_t i = 0; i < 6; ++i) {
-        count += cells[2 * row + i / 3][3 * column + i % 3] ? 1 : 0;
-      }
-      if (count < 3) {
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      if (cv::countNonZero(cells(cv::Rect(3 * column, 2 * row, 3, 2))) < 3) {
         parts.push_back(
             row == 1 && column == 1 ? "middle" : fmt::format("{} {}", kDown[row], kAcross[column]));
       }
@@ -171,12 +173,9 @@ Spread spread_of(const std::vector<BoardView>& views, const cv::Size& size) {
     if (!view.is_used) {
       continue;
     }
-    cv::Matx33d rotation;
-    cv::Rodrigues(view.camera_from_board_r, rotation);
-    const double sign = rotation(2, 2) < 0.0 ? -1.0 : 1.0;
-    const double x = sign * rotation(0, 2);  // the board's normal, away from the camera
-    const double y = sign * rotation(1, 2);
-    const double tilts[] = {-x, x, -y, y};
+    cv::Vec3d normal = normal_of(view);
+    normal *= normal[2] < 0.0 ? -1.0 : 1.0;  // away from the camera
+    const double tilts[] = {-normal[0], normal[0], -normal[1], normal[1]};
     for (int i = 0; i < 4; ++i) {
       spread.tilts[i] = std::max(spread.tilts[i], tilts[i]);
     }
@@ -250,12 +249,12 @@ cv::Mat draw_coverage(const std::vector<BoardView>& views, const cv::Size& size)
   constexpr double kWidth_px = 960.0;
   const double scale = kWidth_px / size.width;
   cv::Mat image(cvRound(scale * size.height), cvRound(kWidth_px), CV_8UC3, cv::Scalar::all(255));
-  const Cells cells = covered_cells(views, size);
+  const cv::Mat1b cells = covered_cells(views, size);
   for (int row = 0; row < kRows; ++row) {
     for (int column = 0; column < kColumns; ++column) {
       const cv::Point from(image.cols * column / kColumns, image.rows * row / kRows);
       const cv::Point to(image.cols * (column + 1) / kColumns, image.rows * (row + 1) / kRows);
-      if (!cells[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)]) {
+      if (cells(row, column) == 0) {
         cv::rectangle(image, from, to, cv::Scalar(250, 205, 200), cv::FILLED);
       }
       cv::rectangle(image, from, to, cv::Scalar::all(225));

@@ -70,13 +70,6 @@ double shared_error_px(const std::vector<BoardView>& views, const Camera& camera
   return std::sqrt(std::max(0.0, sum_px2 / count));
 }
 
-fs::path coverage_file(const BoardRequest& request) {
-  fs::path file = request.out_file;
-  file.replace_extension();
-  file += "_coverage.png";
-  return file;
-}
-
 /// The size that most pictures have.
 Expected<cv::Size> look_at_images(const BoardRequest& request,
                                   const RunProgress& progress,
@@ -141,12 +134,6 @@ std::string file_text(const BoardRequest& request, const BoardReport& report) {
   return text + "\n" + dataset::camera_file_text(file);
 }
 
-Status write_files(const BoardRequest& request, const cv::Size& size, BoardReport& report) {
-  report.coverage_file = coverage_file(request);
-  STEMVO_TRY(write_text_file(request.out_file, file_text(request, report)));
-  return write_image(report.coverage_file, draw_coverage(report.views, size));
-}
-
 }  // namespace
 
 Expected<BoardReport> calibrate_board(const BoardRequest& request, const RunProgress& progress) {
@@ -178,7 +165,9 @@ Expected<BoardReport> calibrate_board(const BoardRequest& request, const RunProg
         px));
   }
   report.missing = missing_views(report.views, size);
-  STEMVO_TRY(write_files(request, size, report));
+  (report.coverage_file = request.out_file).replace_extension() += "_coverage.png";
+  STEMVO_TRY(write_text_file(request.out_file, file_text(request, report)));
+  STEMVO_TRY(write_image(report.coverage_file, draw_coverage(report.views, size)));
   return report;
 }
 

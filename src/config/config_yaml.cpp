@@ -192,19 +192,14 @@ template std::string parse(const YAML::Node&, std::uint64_t&);
 std::string parse(const YAML::Node& node, std::vector<double>& value) {
   if (node.IsScalar()) {
     const Expected<YAML::Node> list = parse_document(node.Scalar(), "value");
-    if (list && !list->IsSequence()) {
-      return fmt::format("expected a list of numbers like [100, 200], found '{}'",
-                         one_line(node.Scalar()));
+    if (!list || list->IsSequence()) {
+      return list ? parse(*list, value) : list.error().message;
     }
-    return list ? parse(*list, value) : list.error().message;
   }
   if (!node.IsSequence()) {
-    return fmt::format("expected a list of numbers, found {}", kind_of(node));
+    return fmt::format("expected a list of numbers like [100, 200], found {}", kind_of(node));
   }
   for (const YAML::Node& element : node) {
-    if (!element.IsScalar()) {
-      return fmt::format("expected a list of numbers, found {} in it", kind_of(element));
-    }
     if (const std::string problem = parse(element, value.emplace_back()); !problem.empty()) {
       return problem;
     }
@@ -220,12 +215,8 @@ std::string format(double value) {
 }
 
 std::string format(const std::string& value) {
-  constexpr std::string_view kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-";
-  const bool is_plain = value.find_first_not_of(kPlain) == std::string::npos && !value.empty() &&
-                        value[0] != '-' && !YAML::IsNullString(value);
   YAML::Emitter out;
-  out << (is_plain ? YAML::Auto : YAML::DoubleQuoted) << value;
+  out << value;
   return out.c_str();
 }
 

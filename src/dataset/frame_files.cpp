@@ -20,17 +20,12 @@ namespace {
 
 constexpr int kBlack = 128;
 
-std::optional<cv::Rect2d> parse_rectangle(std::string part) {
-  std::ranges::replace(part, ',', ' ');
-  const auto numbers = parse_numbers(part, 4);
-  return numbers
-             ? std::optional(cv::Rect2d((*numbers)[0], (*numbers)[1], (*numbers)[2], (*numbers)[3]))
-             : std::nullopt;
-}
-
 Status add_part(const std::string& part, cv::Mat& mask) {
-  if (const auto rectangle = parse_rectangle(part)) {
-    const cv::Rect inside = *rectangle & cv::Rect2d(0, 0, mask.cols, mask.rows);
+  std::string words = part;
+  std::ranges::replace(words, ',', ' ');
+  if (const auto n = parse_numbers(words, 4)) {
+    const cv::Rect inside =
+        cv::Rect2d((*n)[0], (*n)[1], (*n)[2], (*n)[3]) & cv::Rect2d(0, 0, mask.cols, mask.rows);
     if (inside.empty()) {
       return fail(fmt::format("--mask {}: expected a rectangle inside frames of {}x{} pixels", part,
                               mask.cols, mask.rows));
@@ -54,7 +49,6 @@ Status add_part(const std::string& part, cv::Mat& mask) {
 }
 
 Expected<TimedRows<double>> find_times(const Listing& listing, const FrameSourceRequest& request) {
-  const std::size_t num_images = listing.files.size();
   const auto& file = request.times ? request.times : listing.times_file;
   if (request.rate_hz && (file || !listing.times_s.empty())) {
     return fail(fmt::format("--rate {}: expected images without times, found {}", *request.rate_hz,
@@ -63,12 +57,7 @@ Expected<TimedRows<double>> find_times(const Listing& listing, const FrameSource
   if (!file) {
     return TimedRows<double>{listing.times_s, listing.note};
   }
-  auto read = read_kitti_times(*file, num_images);
-  if (read && read->rows.size() != num_images) {
-    return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
-                            file->string(), num_images, read->rows.size()));
-  }
-  return read;
+  return read_kitti_times(*file, listing.files.size(), true);
 }
 
 /// Without times: the camera file's, else the rate asked for, else 30, with a note.
@@ -206,16 +195,21 @@ Status check_size(const cv::Size& found,
                                 found.width, found.height));
 }
 
-Expected<FrameView> view_of(const Camera& camera, const fs::path& camera_file) {
-  auto view = FrameView::create(camera);
-  return view ? view : fail(camera_file.string() + ": " + view.error().message);
-}
-
-Status add_view(FrameSource& frames,
-                const FrameView& view,
-                const std::vector<std::string>& masks,
-                std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
+Expected<FrameView> add_view(FrameSource& frames,
+                             const CameraFile& camera,
+                             const fs::path& camera_file,
+                             const std::vector<std::string>& masks,
+                             std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
+  const auto made = FrameView::create(camera.camera);
+  if (!made) {
+    return fail(camera_file.string() + ": " + made.error().message);
+  }
+  const FrameView& view = *made;
   STEMVO_TRY_GET(const auto mask, make_mask(masks, view.full_size()));
+  frames.given_calibration = camera_file;
+  frames.camera_height_m = camera.camera_height_m;
+  frames.camera_from_imu = camera.camera_from_imu();
+  frames.imu_from_camera_s = camera.imu_from_camera_s;
   frames.mask = view.apply_to_mask(mask);
   frames.full_size = view.full_size();
   frames.camera = view.camera();
@@ -224,7 +218,7 @@ Status add_view(FrameSource& frames,
     return read_whole(index).map(
         [&](const cv::Mat& image) { return image.empty() ? image : view.apply(image); });
   };
-  return {};
+  return view;
 }
 
 Expected<SharedKind> vote_on_images(FrameSource& frames) {
@@ -373,16 +367,12 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
   add_line(frames.warnings, listing.warning);
   STEMVO_TRY_GET(const auto kind, vote_on_images(frames));
   STEMVO_TRY(check_size(kind.size, camera_file.camera, listing.folder.string(), *camera_path));
-  STEMVO_TRY_GET(const auto view, view_of(camera_file.camera, *camera_path));
   frames.kind = listing.kind;
   frames.name = listing.name;
-  frames.given_calibration = camera_path;
-  frames.camera_height_m = camera_file.camera_height_m;
-  frames.camera_from_imu = camera_file.camera_from_imu();
-  frames.imu_from_camera_s = camera_file.imu_from_camera_s;
-  STEMVO_TRY(add_view(frames, view, request.masks, [files = frames.files, kind](std::size_t i) {
+  const auto read = [files = frames.files, kind](std::size_t i) {
     return io::read_image(files[i], kind.is_color, kind.size, kind.levels);
-  }));
+  };
+  STEMVO_TRY(add_view(frames, camera_file, *camera_path, request.masks, read));
   return frames;
 }
 

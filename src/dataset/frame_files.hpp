@@ -81,16 +81,14 @@ namespace stemvo::dataset {
                                 const Camera& camera,
                                 const std::string& owner,
                                 const std::filesystem::path& camera_file);
-/// Error, naming the camera file: that of FrameView::create.
-[[nodiscard]] Expected<FrameView> view_of(const Camera& camera,
-                                          const std::filesystem::path& camera_file);
-
-/// Camera, size, mask and reader: `read_whole` gives the frames as they come, of the view's full
-/// size. Errors: those of make_mask.
-[[nodiscard]] Status add_view(FrameSource& frames,
-                              const FrameView& view,
-                              const std::vector<std::string>& masks,
-                              std::function<Expected<cv::Mat>(std::size_t)> read_whole);
+/// What the camera file says, mask and reader: `read_whole` gives the frames as they come, of the
+/// view's full size. Errors: those of FrameView::create, naming the camera file, and of make_mask.
+[[nodiscard]] Expected<FrameView> add_view(
+    FrameSource& frames,
+    const CameraFile& camera,
+    const std::filesystem::path& camera_file,
+    const std::vector<std::string>& masks,
+    std::function<Expected<cv::Mat>(std::size_t)> read_whole);
 
 struct SharedKind {
   cv::Size size;
@@ -138,8 +136,10 @@ struct SharedKind {
                                                          const Camera& given,
                                                          const Camera& refined);
 
-/// One time per line, for at least `num_expected` images. Errors: read_timed_rows'; fewer lines.
+/// One time per line, for at least `num_expected` images, or as many if `is_exact`. Errors:
+/// read_timed_rows'; another number of lines.
 [[nodiscard]] Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
-                                                           std::size_t num_expected);
+                                                           std::size_t num_expected,
+                                                           bool is_exact = false);
 
 }  // namespace stemvo::dataset

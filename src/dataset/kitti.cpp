@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <string_view>
@@ -113,7 +112,8 @@ Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
 }
 
 Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
-                                             std::size_t num_expected) {
+                                             std::size_t num_expected,
+                                             bool is_exact) {
   STEMVO_TRY_GET(const auto found, read_timed_rows(file, {1}, "a time"));
   TimedRows<double> times{.note = found.note};
   for (const TimedRow& row : found.rows) {
@@ -126,7 +126,7 @@ Expected<TimedRows<double>> read_kitti_times(const std::filesystem::path& file,
         "{}: times {:g}, {:g}, .. are taken for seconds; numbers of frames would be no times",
         file.string(), times.rows[0], times.rows[1]);
   }
-  if (times.rows.size() < num_expected) {
+  if (times.rows.size() < num_expected || (is_exact && times.rows.size() > num_expected)) {
     return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
                             file.string(), num_expected, times.rows.size()));
   }
@@ -144,23 +144,15 @@ constexpr std::size_t kDigits = 6;  // of KITTI's %06d.png
 
 /// 0..3; colour cameras are 2 and 3.
 Expected<int> choose_camera(const fs::path& directory, const std::string& option) {
-  constexpr std::array<int, 4> kOrder = {2, 0, 1, 3};
-  const auto is_there = [&](int index) {
-    return dataset::is_folder(directory / fmt::format("image_{}", index));
-  };
-  const auto found = std::ranges::find_if(kOrder, [&](int index) {
-    return option == "auto" ? index % 2 == 0 && is_there(index)
-                            : option == fmt::format("image_{}", index);
-  });
-  if (found == kOrder.end() && option != "auto") {
-    return fail(
-        fmt::format("input.camera: expected auto or image_0 .. image_3, found '{}'", option));
+  for (const int index : {2, 0, 1, 3}) {
+    const std::string name = fmt::format("image_{}", index);
+    if ((option == name || (option == "auto" && index % 2 == 0)) &&
+        dataset::is_folder(directory / name)) {
+      return index;
+    }
   }
-  if (found == kOrder.end() || !is_there(*found)) {
-    return fail(fmt::format("{}: expected a folder {}, found none", directory.string(),
-                            option == "auto" ? "image_2 or image_0" : option));
-  }
-  return *found;
+  return fail(fmt::format("{}: expected a folder {}, found none", directory.string(),
+                          option == "auto" ? "image_2 or image_0" : option));
 }
 
 /// Frames 000000.png, 000001.png, ... without a gap. Thumbnails and notes may lie beside them.

@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <optional>
 
 #include <opencv2/core.hpp>
 
@@ -27,13 +26,6 @@ struct VideoDecoder {
   std::function<double()> position_ms = nullptr;
 };
 
-/// A file or an address by FFmpeg, turned as the container asks unless frames that are not have
-/// this size; null: camera `number` of the machine (V4L2), asked for images of this size. Nullopt:
-/// nothing there that can be decoded. Error: the module is not where it was installed.
-[[nodiscard]] Expected<std::optional<VideoDecoder>> open_decoder(const char* file,
-                                                                 int number,
-                                                                 const cv::Size& size);
-
 /// Adds a frame to a video, CV_8UC3, BGR; an empty one ends the file. False: it is not whole.
 using WriteFrame = std::function<bool(const cv::Mat& bgr)>;
 /// A video of frames of this size, both sides even; replaces a file. Errors: another ending than
@@ -42,7 +34,9 @@ using WriteFrame = std::function<bool(const cv::Mat& bgr)>;
                                                double rate_hz,
                                                const cv::Size& size);
 
-/// The module's symbols. False: it cannot be opened. `file` is a whole path, or an address.
+/// The module's symbols. A file or an address by FFmpeg, turned as the container asks unless frames
+/// that are not have this size; null: camera `number` of the machine (V4L2), asked for images of
+/// this size. `file` is a whole path, or an address. False: nothing there that can be decoded.
 extern "C" using OpenDecoder =
     bool(const char* file, int number, const cv::Size& size, VideoDecoder& decoder);
 inline constexpr const char* kOpenDecoder = "stemvo_open_decoder";

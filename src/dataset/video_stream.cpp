@@ -90,49 +90,6 @@ std::string stem_of(const std::filesystem::path& path) {
   return way < end ? std::filesystem::path(address.substr(way, end - way)).stem().string() : "";
 }
 
-Expected<std::shared_ptr<VideoStream>> open_file(const fs::path& file, const cv::Size& size) {
-  std::error_code code;
-  // A relative path with a colon would be taken for an address.
-  STEMVO_TRY_GET(auto decoder, open_decoder(fs::absolute(file, code).c_str(), 0, size));
-  if (!decoder) {
-    return fail(fmt::format(
-        "{}: expected a video that FFmpeg can decode, found a file it cannot (cut off, damaged, or "
-        "no video)",
-        file.string()));
-  }
-  std::ifstream boxes(file, std::ios::binary);
-  if (is_mirrored(boxes, static_cast<std::int64_t>(fs::file_size(file, code)))) {
-    return fail(
-        fmt::format("{}: expected a video that players do not mirror, found one that asks for it; "
-                    "'ffmpeg -i IN OUT.mp4' writes frames as players show them",
-                    file.string()));
-  }
-  return std::make_shared<VideoStream>(*std::move(decoder), file.string(), false);
-}
-
-Expected<std::shared_ptr<VideoStream>> open_address(const std::string& address,
-                                                    const cv::Size& size) {
-  STEMVO_TRY_GET(auto decoder, open_decoder(address.c_str(), 0, size));
-  const std::string name = without_secrets(address);
-  if (!decoder || decoder->size.empty()) {
-    return fail(
-        fmt::format("{}: expected a stream of pictures that FFmpeg can decode, found none", name));
-  }
-  const bool is_live = !(decoder->frame_count > 0.0);
-  return std::make_shared<VideoStream>(*std::move(decoder), name, is_live);
-}
-
-Expected<std::shared_ptr<VideoStream>> open_camera(int number, const cv::Size& size) {
-  STEMVO_TRY_GET(auto decoder, open_decoder(nullptr, number, size));
-  if (!decoder) {
-    return fail(fmt::format(
-        "camera:{0}: expected a camera at /dev/video{0} that this user may read, found none; "
-        "'ls -l /dev/video*' lists those there are",
-        number));
-  }
-  return std::make_shared<VideoStream>(*std::move(decoder), fmt::format("camera:{}", number), true);
-}
-
 constexpr const char* kVideoModule = "libstemvo_video.so";
 
 }  // namespace
@@ -140,9 +97,34 @@ constexpr const char* kVideoModule = "libstemvo_video.so";
 Expected<std::shared_ptr<VideoStream>> VideoStream::open(const fs::path& path,
                                                          const cv::Size& size) {
   const auto number = camera_number(path);
-  return number             ? open_camera(*number, size)
-         : is_address(path) ? open_address(path.string(), size)
-                            : open_file(path, size);
+  const bool is_file = !number && !is_address(path);
+  std::error_code code;
+  // A relative path with a colon would be taken for an address.
+  const fs::path whole = is_file ? fs::absolute(path, code) : path;
+  STEMVO_TRY_GET(void* const found, io::load_symbol(kVideoModule, kOpenDecoder, "decodes videos"));
+  VideoDecoder decoder;
+  const bool is_open = reinterpret_cast<OpenDecoder*>(found)(number ? nullptr : whole.c_str(),
+                                                             number.value_or(0), size, decoder);
+  const std::string name = without_secrets(path.string());
+  if (!is_open || (!number && decoder.size.empty())) {
+    return fail(fmt::format(
+        "{}: expected {}", name,
+        number    ? fmt::format("a camera at /dev/video{} that this user may read, found none; "
+                                "'ls -l /dev/video*' lists those there are",
+                                *number)
+        : is_file ? "a video that FFmpeg can decode, found a file it cannot (cut off, damaged, or "
+                    "no video)"
+                  : "a stream of pictures that FFmpeg can decode, found none"));
+  }
+  if (std::ifstream boxes(path, std::ios::binary);
+      is_file && is_mirrored(boxes, static_cast<std::int64_t>(fs::file_size(path, code)))) {
+    return fail(
+        fmt::format("{}: expected a video that players do not mirror, found one that asks for it; "
+                    "'ffmpeg -i IN OUT.mp4' writes frames as players show them",
+                    name));
+  }
+  const bool is_live = number || (!is_file && !(decoder.frame_count > 0.0));
+  return std::make_shared<VideoStream>(std::move(decoder), name, is_live);
 }
 
 std::size_t VideoStream::expected_frames() const {
@@ -249,7 +231,6 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   const std::string owner = without_secrets(request.sequence_dir.string());
   const FrameRangeRequest range = request.frames.value_or(FrameRangeRequest{});
   STEMVO_TRY(check_size(stream->decoder().size, camera.camera, owner, *request.camera_file));
-  STEMVO_TRY_GET(const FrameView view, view_of(camera.camera, *request.camera_file));
   if (const auto& rate_hz = camera.rate_hz ? camera.rate_hz : request.rate_hz) {
     stream->set_counted_rate(*rate_hz);
   }
@@ -272,8 +253,6 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                              [stream] { return stream->num_counted(); },
                              stream->rate_hz(),
                              stream->counted_hz()};
-  frames.given_calibration = request.camera_file;
-  frames.camera_height_m = camera.camera_height_m;
   frames.warnings = camera.warnings;
   add_line(frames.warnings, warn_of_turn(*stream, owner));
   constexpr double kAlike = 0.05;
@@ -284,18 +263,11 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
         fmt::format("{} {}: {} says when each frame was taken, which goes before it",
                     request.rate_hz ? "--rate" : "rate_hz", *said_hz, owner));
   }
-  if (range.end && frames.stream->expected_frames > 0 && all < *range.end) {
-    frames.warnings.push_back(
-        fmt::format("--frames {}:{}: {} has {} frames, as its container counts them", range.begin,
-                    *range.end, owner, all));
-  }
   if (stream->decoder().gray_bits > 8) {
     frames.warnings.push_back(fmt::format(
         "{}: of {} bits per gray level the upper 8 are taken; images of 16 bits are read whole",
         owner, stream->decoder().gray_bits));
   }
-  frames.camera_from_imu = camera.camera_from_imu();
-  frames.imu_from_camera_s = camera.imu_from_camera_s;
   if (request.ground_truth) {
     STEMVO_TRY_GET(const auto truth, read_truth(*request.ground_truth, request.camera_file));
     STEMVO_TRY(check_length(truth, frames, request));
@@ -317,7 +289,7 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
     }
     return image;
   };
-  STEMVO_TRY(add_view(frames, view, request.masks, read));
+  STEMVO_TRY(add_view(frames, camera, *request.camera_file, request.masks, read));
   return frames;
 }
 
@@ -334,18 +306,6 @@ Expected<FrameSource> open_video(const FrameSourceRequest& request) {
   const auto stream = VideoStream::open(request.sequence_dir, size);
   return stream.and_then([&](const std::shared_ptr<VideoStream>& opened) {
     return open_stream(opened, camera, request);
-  });
-}
-
-Expected<std::optional<VideoDecoder>> open_decoder(const char* file,
-                                                   int number,
-                                                   const cv::Size& size) {
-  static const Expected<void*> found =
-      io::load_symbol(kVideoModule, kOpenDecoder, "decodes videos");
-  return found.map([&](void* open) {
-    std::optional<VideoDecoder> decoder(std::in_place);
-    return reinterpret_cast<OpenDecoder*>(open)(file, number, size, *decoder) ? decoder
-                                                                              : std::nullopt;
   });
 }
 

@@ -2,7 +2,6 @@
 #include "evaluation/trajectory.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -54,24 +53,12 @@ std::optional<Format> format_of_commas(std::string_view row, bool says_nanosecon
 /// Names that end with w, x, .. in this order ("qw qx ..", "orientation.w orientation.x ..", "w x
 /// y z"), or are counted, whose first is w in most programs.
 bool names_w_first(std::string_view comment) {
-  std::string axes;
-  std::string name;
-  for (const char c : std::string(comment) + ' ') {
-    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
-      name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-      continue;
-    }
-    if (name == "q0") {
-      return true;
-    }
-    if (!name.empty()) {
-      const bool is_axis = name.size() == 1 || (name.size() == 2 && name.front() == 'q');
-      axes += is_axis ? name.back() : ' ';
-    }
-    name.clear();
-  }
-  static const std::regex kOrder("w[ q]{0,2}x");
-  return std::regex_search(axes, kOrder);
+  static const std::regex kOrder(
+      "(^|[^a-z0-9])(q0|q?w([^a-z0-9]+(qq?|[a-pr-z0-9][a-z0-9]|[a-z0-9]{3,})){0,2}[^a-z0-9]+q?x)"
+      "([^a-z0-9]|$)",
+      std::regex::icase);
+  const std::string start(comment.substr(0, 1000));  // longer texts take std::regex all the stack
+  return std::regex_search(start, kOrder);
 }
 
 /// Nullopt: the numbers may be of two formats, or a comment says another order.
@@ -120,31 +107,28 @@ Expected<TimedPose> pose_from_quaternion_row(const std::vector<double>& n) {
   return TimedPose{n[0], Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3]))};
 }
 
-/// The columns of the pose as a row of TUM's, whose quaternion ends with w. Those behind it
-/// (velocity, biases) are not read.
-Expected<std::string> to_tum_row(std::string_view line) {
-  const std::vector<std::string_view> words = split_words(line);
-  if (words.size() < 8) {
-    return fail(
-        fmt::format("expected time, x, y, z, qw, qx, qy, qz, .., found {} numbers", words.size()));
-  }
-  return fmt::format("{} {} {} {} {} {} {} {}", words[0], words[1], words[2], words[3], words[5],
-                     words[6], words[7], words[4]);
-}
-
+/// Of EuRoC's, whose quaternion begins with w, the columns behind the pose (velocity, biases) are
+/// not read.
 Expected<TimedPose> parse_row(Format format, std::string_view given) {
   // Fewer commas are those of decimals.
   const bool has_commas = format != Format::kKitti || std::ranges::count(given, ',') == 11;
-  const std::string line = has_commas ? with_blanks(given) : std::string(given);
+  std::string line = has_commas ? with_blanks(given) : std::string(given);
   if (format == Format::kKitti) {
     return parse_numbers(line, 12).and_then(pose_from_rows).map([](const Rigid3& pose) {
       return TimedPose{0.0, pose};
     });
   }
-  return (format == Format::kEuroc
-              ? to_tum_row(line).and_then([](const auto& row) { return parse_numbers(row, 8); })
-              : parse_numbers(line, 8))
-      .and_then(pose_from_quaternion_row);
+  if (format == Format::kEuroc) {
+    std::vector<std::string_view> words = split_words(line);
+    if (words.size() < 8) {
+      return fail(fmt::format("expected time, x, y, z, qw, qx, qy, qz, .., found {} numbers",
+                              words.size()));
+    }
+    words.resize(8);
+    std::rotate(words.begin() + 4, words.begin() + 5, words.end());
+    line = fmt::format("{}", fmt::join(words, " "));
+  }
+  return parse_numbers(line, 8).and_then(pose_from_quaternion_row);
 }
 
 Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Format format) {
@@ -154,7 +138,7 @@ Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Forma
   while (!lines.empty() && is_blank(lines.back())) {
     lines.pop_back();
   }
-  PoseFile result{.file = file, .is_of_body = format == Format::kEuroc};
+  std::vector<TimedPose> rows;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const std::string_view line =
         format == Format::kKitti ? lines[i] : lines[i].substr(0, lines[i].find('#'));
@@ -165,29 +149,21 @@ Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Forma
     if (!row) {
       return fail_at(file, i, row.error());
     }
-    result.poses.push_back(row->pose);
-    if (format != Format::kKitti) {
-      result.timestamps_s.push_back(unit_s * row->time);
-    }
+    rows.push_back(*row);
   }
-  if (result.poses.empty()) {
+  if (rows.empty()) {
     return fail(fmt::format("{}: expected at least one pose, found none", file.string()));
   }
-  return result;
-}
-
-/// Files that were put together by hand are not always in order.
-void sort_by_time(PoseFile& file) {
-  std::vector<double>& times_s = file.timestamps_s;
-  if (std::is_sorted(times_s.begin(), times_s.end())) {
-    return;
+  // Files that were put together by hand are not always in order.
+  std::ranges::stable_sort(rows, {}, &TimedPose::time);
+  PoseFile result{.file = file, .is_of_body = format == Format::kEuroc};
+  for (const TimedPose& row : rows) {
+    result.poses.push_back(row.pose);
+    if (format != Format::kKitti) {
+      result.timestamps_s.push_back(unit_s * row.time);
+    }
   }
-  std::vector<std::size_t> order(times_s.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return times_s[a] < times_s[b]; });
-  file.poses = take_poses(file.poses, order);
-  std::sort(times_s.begin(), times_s.end());
+  return result;
 }
 
 Error either_format(const fs::path& file, std::string_view found) {
@@ -328,7 +304,6 @@ Expected<PoseFile> read_pose_file(const fs::path& file) {
   }
   Expected<PoseFile> result = parse_rows(file, text, *format);
   if (result) {
-    sort_by_time(*result);
     STEMVO_TRY(check_steps(file, *format, result->timestamps_s));
   }
   return result;

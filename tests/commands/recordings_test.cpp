@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <nlohmann/json.hpp>
 
-#include "dataset/video_decoder.hpp"
+#include "dataset/video_stream.hpp"
 #include "evaluation/trajectory.hpp"
 #include "support/program_test.hpp"
 #include "support/shared_data.hpp"
@@ -106,13 +106,13 @@ TEST_F(RecordingsRun, AVideoShowsFramesTracksAndPath) {
                                           std::tuple(avi, "avi.mkv", Words{"--camera", camera_})}) {
     const ProgramResult result = run(input, joined({"--video", folder_ / name}, more));
     ASSERT_EQ(result.exit_code, 0) << result.err;
-    const auto video = dataset::open_decoder((folder_ / name).c_str(), 0, {}).value();
-    ASSERT_TRUE(video);
-    EXPECT_EQ(video->size, cv::Size(620 + 188 + 40, 188 + 40));
-    EXPECT_NEAR(video->rate_hz, 10.0, 0.1);
+    const auto stream = dataset::VideoStream::open(folder_ / name, {}).value();
+    const dataset::VideoDecoder& video = stream->decoder();
+    EXPECT_EQ(video.size, cv::Size(620 + 188 + 40, 188 + 40));
+    EXPECT_NEAR(video.rate_hz, 10.0, 0.1);
     int count = 0;
-    for (; video->grab(); ++count) {
-      const cv::Mat shown = video->retrieve();
+    for (; video.grab(); ++count) {
+      const cv::Mat shown = video.retrieve();
       cv::Mat apart = cv::imread(image(count), cv::IMREAD_COLOR);
       if (!apart.empty()) {
         cv::absdiff(shown(cv::Rect(0, 40, 620, 188)), apart, apart);

@@ -310,9 +310,8 @@ TEST_F(Recordings, AFileNamedLikeAnAddressIsAFile) {
 }
 
 TEST_F(Recordings, ALiveCameraHasTheClocksTimes) {
-  auto decoder = dataset::open_decoder(write_video().c_str(), 0, {});
-  ASSERT_TRUE(decoder) << decoder.error().message;
-  auto stream = std::make_shared<dataset::VideoStream>(**std::move(decoder), "camera:0", true);
+  const auto video = dataset::VideoStream::open(write_video(), {}).value();
+  auto stream = std::make_shared<dataset::VideoStream>(video->decoder(), "camera:0", true);
   const std::string file = camera("");
   FrameSourceRequest live = request("camera:0");
   live.camera_file = file;
