@@ -54,11 +54,8 @@ Status prepare_out_folder(const Run& run) {
 }
 
 std::string describe_truth(const RunRequest& request, const FrameSource& sequence) {
-  if (!sequence.has_ground_truth()) {
-    return "no ground truth";
-  }
-  if (sequence.stream) {
-    return "ground truth to be matched";
+  if (!sequence.ground_truth) {
+    return sequence.match ? "ground truth to be matched" : "no ground truth";
   }
   const std::size_t count = sequence.ground_truth->frames.size();
   return count == sequence.size()
