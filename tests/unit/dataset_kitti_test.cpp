@@ -84,7 +84,7 @@ TEST_F(KittiSequenceTest, CameraIsChosenAndNeverReplaced) {
   EXPECT_EQ(gray->read(0)->type(), CV_8UC1);
   EXPECT_EQ(open_kitti(folder_)->camera.fx_px, 100.0) << "auto takes image_2";
   EXPECT_THAT(open_error({.camera = "image_3"}), HasSubstr("image_3"));
-  EXPECT_THAT(open_error({.camera = "left"}), HasSubstr("found 'left'"));
+  EXPECT_THAT(open_error({.camera = "left"}), HasSubstr("expected a folder left, found none"));
 }
 
 TEST_F(KittiSequenceTest, FolderProblems) {
