@@ -263,17 +263,15 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
         fmt::format("{} {}: {} says when each frame was taken, which goes before it",
                     request.rate_hz ? "--rate" : "rate_hz", *said_hz, owner));
   }
-<<<<<<< HEAD
-  if (stream->decoder().gray_bits > 8) {
-    frames.warnings.push_back(fmt::format(
-        "{}: of {} bits per gray level the upper 8 are taken; images of 16 bits are read whole",
-        owner, stream->decoder().gray_bits));
-=======
   if (range.end && frames.stream->expected_frames > 0 && all < *range.end) {
     frames.warnings.push_back(
         fmt::format("--frames {}:{}: {} has {} frames, as its container counts them", range.begin,
                     *range.end, owner, all));
->>>>>>> parent of 9f6ebae7 (A video shorter than --frames: the number of frames that were taken is said anyway)
+  }
+  if (stream->decoder().gray_bits > 8) {
+    frames.warnings.push_back(fmt::format(
+        "{}: of {} bits per gray level the upper 8 are taken; images of 16 bits are read whole",
+        owner, stream->decoder().gray_bits));
   }
   if (request.ground_truth) {
     STEMVO_TRY_GET(const auto truth, read_truth(*request.ground_truth, request.camera_file));
