@@ -53,14 +53,14 @@ class DriveTracks {
     return path;
   }
 
-  /// From this frame on every second track has another id (that of its point, plus the number of
-  /// points): its corner was lost and is new.
-  void renew_tracks(int frame, int remainder) {
+  /// From this frame on every `one_in`-th track has another id (that of its point, plus the number
+  /// of points): its corner was lost and is new.
+  void renew_tracks(int frame, int remainder, int one_in = 2) {
     for (int i = frame; i < num_frames(); ++i) {
       auto& seen = observations[static_cast<std::size_t>(i)];
       const auto before = seen;
       for (const auto& [id, uv] : before) {
-        if (id % 2 == remainder && id < static_cast<int>(points.size())) {
+        if (id % one_in == remainder && id < static_cast<int>(points.size())) {
           seen.erase(id);
           seen.emplace(id + static_cast<int>(points.size()), uv);
         }

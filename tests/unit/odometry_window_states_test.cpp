@@ -41,6 +41,26 @@ TEST(WindowEstimator, StationaryKeepsPoseMapAndScale) {
   expect_scale_kept(d, 59);
 }
 
+/// What passes hides the landmarks: tracks begun meanwhile say how the camera moves off, the few
+/// landmarks left how far.
+TEST(WindowEstimator, MovingOffKeepsTheUnitWithFewOldLandmarks) {
+  const Rigid3 step(so3_exp({0.0, 0.003, 0.0}), {0.0, 0.0, 0.8});
+  const Rigid3 slower(step.rotation, 0.5 * step.translation);
+  const std::vector<Rigid3> path = DriveTracks::go_on(
+      DriveTracks::go_on(DriveTracks::repeat(step, 20), Rigid3(), 40), slower, 20);
+  DriveTracks drive(path, points_along(path, 2000, 4), 0.1, 4);
+  for (int i = 1; i < 60; ++i) {
+    drive.renew_tracks(i < 30 ? 30 : 40, i, 60);
+  }
+  for (int i = 60; i < 300; i += 60) {  // seven are left in the second frame that moves
+    drive.renew_tracks(61, i, 300);
+  }
+  Driven d(std::move(drive));
+  d.add_range(0, 80);
+  d.expect_only(60, 80, FrameState::kTracking);
+  expect_scale_kept(d, 59);
+}
+
 TEST(WindowEstimator, ATurnThatLosesEveryLandmarkFromViewStaysWhereItIs) {
   const std::vector<Rigid3> path =
       path_with(Rigid3(so3_exp({0.0, 2.5 * kDeg, 0.0}), Eigen::Vector3d::Zero()), 44);
