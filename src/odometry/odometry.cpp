@@ -282,7 +282,9 @@ Expected<FrameResult> Odometry::process(const cv::Mat& image,
   if (impl_->loops.has_thrown()) {
     impl_->loops.finish();  // throws it
   }
-  STEMVO_TRY(status);
+  if (!status) {
+    return status.error();
+  }
   return *impl_->take();
 }
 
