@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline/out_folder.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 
@@ -39,6 +40,26 @@ Status check_may_be_replaced(const fs::path& folder, const std::string& command)
       fmt::format("{}: expected a new folder, an empty one or results of 'stemvo {}', found other "
                   "files",
                   folder.string(), command));
+}
+
+Status check_holds_none(const fs::path& folder, const std::vector<fs::path>& inputs) {
+  std::error_code code;
+  const fs::path root = fs::weakly_canonical(fs::absolute(folder, code), code);
+  const auto is_below_root = [&root](const fs::path& path) {
+    return std::ranges::mismatch(root, path).in1 == root.end();
+  };
+  const auto is_inside = [&](const fs::path& input) {
+    const fs::path path = fs::absolute(input, code);
+    // A link to a file may lie in the folder, or lead into it.
+    return fs::exists(input, code) &&
+           (is_below_root(fs::weakly_canonical(path.parent_path(), code)) ||
+            is_below_root(fs::weakly_canonical(path, code).parent_path()));
+  };
+  const auto found = std::ranges::find_if(inputs, is_inside);
+  return found == inputs.end()
+             ? Status()
+             : Status(fail(fmt::format("{}: expected a folder that holds no input, found {}",
+                                       folder.string(), found->string())));
 }
 
 /// Error: another process has it. On a file system without locks it is taken without one.
@@ -82,7 +103,10 @@ Expected<fs::path> create_results_folder(const std::string& name) {
   return code ? Expected<fs::path>(refuse(folder, code.message())) : folder;
 }
 
-Expected<FolderLock> open_out_folder(const fs::path& folder, const std::string& command) {
+Expected<FolderLock> open_out_folder(const fs::path& folder,
+                                     const std::string& command,
+                                     const std::vector<fs::path>& inputs) {
+  STEMVO_TRY(check_holds_none(folder, inputs));
   STEMVO_TRY(create_out_folder(folder));
   STEMVO_TRY_GET(FolderLock lock, lock_folder(folder));
   STEMVO_TRY(check_may_be_replaced(folder, command));

@@ -24,9 +24,12 @@ using FolderLock = std::shared_ptr<void>;
 [[nodiscard]] Expected<std::filesystem::path> create_results_folder(const std::string& name);
 
 /// Creates the folder with the command's mark and locks it. Errors: it holds files but no mark of
-/// this command; it cannot be written; another process has it now.
-[[nodiscard]] Expected<FolderLock> open_out_folder(const std::filesystem::path& folder,
-                                                   const std::string& command);
+/// this command; one of the `inputs` lies in it, also through a link; it cannot be written; another
+/// process has it now.
+[[nodiscard]] Expected<FolderLock> open_out_folder(
+    const std::filesystem::path& folder,
+    const std::string& command,
+    const std::vector<std::filesystem::path>& inputs);
 
 /// Error: the file to write is one of the inputs, also through a link.
 [[nodiscard]] Status check_is_no_input(const std::filesystem::path& file,

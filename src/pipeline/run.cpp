@@ -74,7 +74,7 @@ std::string describe_size(const FrameSource& sequence) {
   return fmt::format("{} of {}x{} pixels{}", count, full.width, full.height, worked_on);
 }
 
-void note_start(const Run& run) {
+void note_start(const Run& run, bool is_replacing) {
   const auto& [request, sequence, odometry, beside, video] = run;
   if (!request.note) {
     return;
@@ -84,6 +84,11 @@ void note_start(const Run& run) {
                            beside.note));
   for (const std::vector<std::string>& notes : {sequence.notes, beside.unit_notes}) {
     std::ranges::for_each(notes, request.note);
+  }
+  if (is_replacing) {
+    request.note(
+        fmt::format("files of an earlier result in {} are replaced (another --out keeps them)",
+                    request.out_dir.string()));
   }
 }
 
@@ -127,18 +132,17 @@ Expected<RunSummary> run_source(RunRequest request,
   }
   pipeline::DriveVideo video;
   const Run run{request, sequence, odometry, beside, video};
-  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(request.out_dir, "run"));
-  // Before anything is removed: a wrong name costs no earlier result, nor the frames.
-  STEMVO_TRY(pipeline::check_is_no_input(
-      request.out_dir / "pictures", {request.sequence_dir, request.sequence_dir.parent_path()}));
+  const bool is_replacing = pipeline::is_folder_of(request.out_dir, "run");
+  auto inputs = pipeline::input_files(request, sequence, request.config);
+  inputs.insert(inputs.end(),
+                {request.speeds.value_or(""), request.gyro.value_or(""), request.map.value_or("")});
+  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(request.out_dir, "run", inputs));
+  // Before anything is removed: a wrong name costs no earlier result.
   if (request.saved_map) {
     STEMVO_TRY(check_place_of_map(*request.saved_map));
     STEMVO_TRY(check_can_write(*request.saved_map));
   }
   if (request.video) {
-    auto inputs = pipeline::input_files(request, sequence, request.config);
-    inputs.insert(inputs.end(), {request.speeds.value_or(""), request.gyro.value_or(""),
-                                 request.map.value_or("")});
     STEMVO_TRY(pipeline::check_is_no_input(*request.video, inputs));
     STEMVO_TRY_GET(video, pipeline::DriveVideo::create(request, sequence));
   }
@@ -146,7 +150,7 @@ Expected<RunSummary> run_source(RunRequest request,
   if (request.measure_times) {
     recorder.emplace();
   }
-  note_start(run);
+  note_start(run, is_replacing);
   return finish_run(run, progress);
 }
 
@@ -174,7 +178,9 @@ Expected<ChannelImagesReport> write_channel_images(const ChannelImagesRequest& r
       const FrameRange filters,
       dataset::resolve_range(request.filters, static_cast<std::size_t>(stem.info().num_filters),
                              stem.info().model, "filters"));
-  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(request.out_dir, "channel"));
+  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(
+                                      request.out_dir, "channel",
+                                      pipeline::input_files(request, sequence, request.config)));
   std::size_t num_written = 0;
   const auto save = [&](const cv::Mat& image, std::size_t number, const std::string& name) {
     ++num_written;

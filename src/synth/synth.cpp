@@ -66,7 +66,7 @@ Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
         "{}: expected poses of a rendered drive or none, found others (--name gives another name)",
         drive.poses.string()));
   }
-  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(drive.sequence, "synth"));
+  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(drive.sequence, "synth", {}));
   for (const char* content : {"image_2", "depth", "moving", "times.txt"}) {
     fs::remove_all(drive.sequence / content, code);
   }
