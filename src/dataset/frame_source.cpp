@@ -30,6 +30,8 @@ Error refuse(const fs::path& path) {
     problem =
         "images: expected --camera FILE, or camera.yaml in their folder, found neither; "
         "'stemvo run --help' shows what it holds";
+  } else if (dataset::is_folder(path / "sequences")) {
+    problem = "expected one recording, found a folder of them; give one, as sequences/00 in it";
   } else if (dataset::is_image_file(path)) {
     problem = "expected a recording, found one image; give its folder, or a quoted pattern";
   } else if (is_bag(path)) {
@@ -51,7 +53,13 @@ std::optional<Expected<dataset::Listing>> find_listing(const FrameSourceRequest&
   if (found || !request.camera_file || !may_hold_images) {
     return found;
   }
-  return dataset::list_images(path);
+  auto images = dataset::list_images(path);
+  if (!images && looks_like_kitti(path)) {
+    return fail(
+        fmt::format("{}: KITTI's layout: expected no --camera, or --calib in its place, found {}",
+                    path.string(), request.camera_file->string()));
+  }
+  return images;
 }
 
 Status check_unused(const FrameSourceRequest& request, bool is_listing, bool is_stream) {

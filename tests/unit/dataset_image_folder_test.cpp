@@ -202,6 +202,9 @@ TEST_F(ImageFolderTest, NeitherCameraFileNorKittisLayout) {
   request_.sequence_dir = images_ / "*.jpg";
   EXPECT_THAT(error_of(), HasSubstr("*.jpg: images: " + next));
   fs::create_directories(temp_ / "root/sequences");
+  request_.sequence_dir = temp_ / "root";
+  EXPECT_THAT(error_of(),
+              HasSubstr("root: expected one recording, found a folder of them; give one"));
   request_.sequence_dir = temp_ / "root/sequences";
   EXPECT_THAT(error_of(),
               HasSubstr("or images, found none of them; 'stemvo run --help' shows each"));
@@ -223,6 +226,10 @@ TEST_F(ImageFolderTest, BagsAreNamedWithWhatReadsThem) {
 TEST_F(ImageFolderTest, ACameraFileBesideAKittiCalibrationIsRefused) {
   request_.calibration = temp_ / "calib.txt";
   EXPECT_THAT(error_of(), HasSubstr("calib.txt: expected --camera or --calib"));
+  request_.calibration.reset();
+  fs::create_directories(temp_ / "00/image_2");
+  request_.sequence_dir = temp_ / "00";
+  EXPECT_THAT(error_of(), HasSubstr("00: KITTI's layout: expected no --camera, or --calib"));
 }
 
 using dataset::comes_before;
