@@ -65,7 +65,14 @@ void add_options(CLI::App& command, SynthArguments& arguments) {
       .add_flag("--walk", options.walk,
                 "Walk through a courtyard with the camera in the hand, in place of a drive")
       ->excludes(trajectory);
-  command.add_option("--name", options.name, "The sequence's name; default 00")->type_name("NAME");
+  command.add_option("--name", options.name, "The sequence's name; default 00")
+      ->type_name("NAME")
+      ->check([](const std::string& name) {
+        const std::filesystem::path path(name);
+        const bool is_name =
+            path.has_filename() && path.filename() == path && name != "." && name != "..";
+        return is_name ? "" : "expected the name of a folder, found '" + name + "'";
+      });
   command.add_option("--frames", options.num_frames, "Frames to render; default 100")
       ->type_name("N")
       ->check(in_range(1, 1000000));

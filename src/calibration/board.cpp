@@ -134,7 +134,8 @@ BoardPoints find_grid(const Board& board, const std::vector<Marker>& markers) {
       }));
     }
   }
-  return *std::ranges::min_element(layouts, {}, misfit_px);
+  const BoardPoints& best = *std::ranges::min_element(layouts, {}, misfit_px);
+  return std::isfinite(misfit_px(best)) ? best : BoardPoints();
 }
 
 /// The markers are on the squares of one colour, by their numbers; `parity` says which.

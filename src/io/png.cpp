@@ -21,20 +21,27 @@ using Context = std::unique_ptr<spng_ctx, decltype(&spng_ctx_free)>;
 
 Context make_context(int flags) {
   Context context{spng_ctx_new(flags), &spng_ctx_free};
-  return context != nullptr ? std::move(context) : throw std::bad_alloc();
+  if (context == nullptr) {
+    throw std::bad_alloc();
+  }
+  // Of what is not pixels: a packed text of a megabyte would be unpacked to a gigabyte.
+  constexpr std::size_t kMaxChunk = 1U << 23U;
+  spng_set_chunk_limits(context.get(), kMaxChunk, kMaxChunk);
+  return context;
 }
 
-/// Empty: damaged. Else 8 bits, gray or RGB, or 16 bits, RGBA.
+/// Empty: damaged. Else 8 bits, gray or RGB, or 16 bits, gray or RGBA.
 cv::Mat decode(spng_ctx& png, const spng_ihdr& header, bool keeps_16_bits) {
-  const bool is_deep = header.bit_depth == 16;
-  const bool is_gray = header.color_type == SPNG_COLOR_TYPE_GRAYSCALE && !is_deep;
-  const spng_format format = is_deep && keeps_16_bits ? SPNG_FMT_RGBA16
-                             : is_gray                ? SPNG_FMT_G8
-                                                      : SPNG_FMT_RGB8;
+  const bool is_gray = header.color_type == SPNG_COLOR_TYPE_GRAYSCALE;
+  const bool is_deep = header.bit_depth == 16 && keeps_16_bits;
+  const bool is_plain_gray = is_gray && header.bit_depth <= 8;
+  const spng_format format = is_deep         ? is_gray ? SPNG_FMT_PNG : SPNG_FMT_RGBA16
+                             : is_plain_gray ? SPNG_FMT_G8
+                                             : SPNG_FMT_RGB8;
   cv::Mat image(static_cast<int>(header.height), static_cast<int>(header.width),
-                format == SPNG_FMT_RGBA16 ? CV_16UC4
-                : is_gray                 ? CV_8UC1
-                                          : CV_8UC3);
+                is_deep         ? CV_16UC(is_gray ? 1 : 4)
+                : is_plain_gray ? CV_8UC1
+                                : CV_8UC3);
   const bool is_sound =
       spng_decode_image(&png, image.data, image.total() * image.elemSize(), format, 0) == SPNG_OK &&
       spng_decode_chunks(&png) == SPNG_OK;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "mapping/place_recognizer.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <limits>

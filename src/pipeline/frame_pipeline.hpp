@@ -54,8 +54,8 @@ void run_frames(const FrameSource& sequence,
                 const FrameVisitor& visit,
                 const BesideFrames& beside = {});
 
-/// OpenCV works on `num_threads` threads (0: one per core) in the whole process from here on; where
-/// it is built with TBB, while the result lives.
+/// OpenCV works on `num_threads` threads (0: one per core) in the whole process from here on. TBB,
+/// where OpenCV is built with it, holds to them while the result lives.
 [[nodiscard]] inline tbb::global_control limit_threads(int num_threads) {
   const int limit = num_threads > 0 ? num_threads : cv::getNumberOfCPUs();
   cv::setNumThreads(limit);

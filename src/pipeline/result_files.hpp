@@ -70,7 +70,7 @@ struct Drive {
   SmallFrames small_frames;                  ///< for report.html too
   std::vector<std::string> warnings;
   bool interrupted = false;
-  Status written;  ///< of frames.csv and the images
+  Status written;  ///< of what grows while frames come: poses, frames.csv, images
 };
 
 /// Takes a run's frames through the odometry and keeps what each brings. Rows of frames.csv,

@@ -31,8 +31,11 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
       !(sequence->ground_truth && sequence->ground_truth->frames.size() == sequence->size())) {
     return fail(fmt::format(
         "{}: expected a true pose of every frame (see --gt), which scale.source=ground_truth "
-        "needs, found none, some only or a stream, whose times are not known before",
-        request.sequence_dir.string()));
+        "needs, found {}",
+        request.sequence_dir.string(),
+        sequence->stream         ? "a stream, whose times are not known before"
+        : sequence->ground_truth ? "some only"
+                                 : "none"));
   }
   return sequence;
 }

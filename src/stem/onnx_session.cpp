@@ -73,11 +73,13 @@ Expected<OnnxHandle<T>> OnnxSession::make(void (*release)(T*), Create call, Give
   return OnnxHandle<T>(made, release);
 }
 
-Expected<OnnxSession> OnnxSession::create(const std::string& label, std::string_view model) {
+Expected<OnnxSession> OnnxSession::create(const std::string& label, std::string_view model) try {
   OnnxSession session(label);
   STEMVO_TRY(session.load(model));
   STEMVO_TRY(session.check_tensors());
   return session;
+} catch (const std::bad_alloc&) {  // a size that the model asks for
+  return fail(label + ": expected a model that fits into memory, found one that does not");
 }
 
 Status OnnxSession::load(std::string_view model) {

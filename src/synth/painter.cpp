@@ -39,7 +39,8 @@ std::array<float, kSamples> sample_weights(double fill) {
   float sum = 0.0F;
   for (int k = 0; k < kSamples; ++k) {
     const Eigen::AlignedBox2d cell(sample(k) - half_cell, sample(k) + half_cell);
-    const double area = square.intersection(cell).volume();
+    const Eigen::AlignedBox2d common = square.intersection(cell);
+    const double area = common.isEmpty() ? 0.0 : common.volume();
     sum += weights[static_cast<std::size_t>(k)] = static_cast<float>(area);
   }
   for (float& weight : weights) {

@@ -60,6 +60,9 @@ struct DriveFolder {  // OUT/sequences/NAME and OUT/poses/NAME.txt
 /// Makes the folders, empty. Error: what is there was not rendered.
 Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
                                            const SyntheticDriveOptions& options) {
+  if (options.trajectory) {
+    STEMVO_TRY(pipeline::check_is_no_input(drive.poses, {*options.trajectory}));
+  }
   std::error_code code;
   if (fs::exists(drive.poses, code) && !pipeline::is_folder_of(drive.sequence, "synth")) {
     return fail(fmt::format(

@@ -52,6 +52,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"synth", "x", "--seed", "-3"}, "--seed"},
       {{"evaluate", "--gt", "a", "b", "--gt-tolerance", "nan"}, "from 0 to 3600, found nan"},
       {{"run", "x", "--out", "o", "--gt-tolerance", "inf"}, "--gt-tolerance"},
+      {{"synth", "x", "--name", "../x"}, "--name"},
       {{"synth", "x", "--walk", "--trajectory", "p.txt"}, "--trajectory"},
       {{"calibrate", "x"}, "--out"},
       {{"calibrate", "--out", "o"}, "INPUT"},

@@ -52,6 +52,16 @@ TEST_F(Overwrite, NoCommandTakesAFolderThatIsNotItsOwn) {
   EXPECT_EQ(std::distance(fs::directory_iterator(mine), fs::directory_iterator()), 1);
 }
 
+TEST_F(Overwrite, PosesThatADriveIsRenderedAlongStay) {
+  const std::string drive = folder_ / "drive";
+  const Words synth = {"synth", drive, "--frames", "2"};
+  succeeded(run_stemvo(synth));
+  const fs::path poses = fs::path(drive) / "poses/00.txt";
+  const std::string before = read_file(poses);
+  expect_error(run_stemvo(synth, {"--trajectory", poses}), 1, {poses});
+  EXPECT_EQ(read_file(poses), before);
+}
+
 TEST_F(Overwrite, NothingIsLeftInTheUsersHome) {
   const fs::path home = folder_ / "home";
   fs::create_directory(home);

@@ -57,7 +57,15 @@ TEST(Png, EveryKindHasThePixelsOpenCvGives) {
       "\000"
       "Hx\237g\000\000\000\006PLTE\377\000\000\000\377\011\253[W\325\000\000\000\014IDA"
       "Tx\332cp`h\000\000\001D\000\301\004\207\317\372\000\000\000\000IEND\256B`\202"s;
+  /// 5x5 pixels, interlaced, one gray level of them transparent.
+  const std::string interlaced =
+      "\211PNG\015\012\032\012\000\000\000\015IHDR\000\000\000\005\000\000\000\005"
+      "\010\000\000\000\001\337\003I\257\000\000\000\002tRNS\000\011\017Ou\234\000"
+      "\000\000-IDATx\332c``Pa\330r\203A\210\341\030CTN"
+      "\035\003\247\064Cr)\303\336\363\014\272f\366\036\201\014\355\023f.Z\015\000"
+      "\237\267\012\215\210R\354\244\000\000\000\000IEND\256B`\202"s;
   files.emplace_back(palette.begin(), palette.end());
+  files.emplace_back(interlaced.begin(), interlaced.end());
   for (const File& png : files) {
     for (const bool as_color : {false, true}) {
       const Expected<cv::Mat> image = decode_png(png, "a.png", as_color);
