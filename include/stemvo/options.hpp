@@ -78,7 +78,7 @@ enum class Composition {
   kRight,  ///< R_c R
   kPaper,  ///< R R_c, as printed in eq. (12)
 };
-/// What a step of mode two_frame that does not go forward loses.
+/// A step of mode two_frame that does not go forward loses this.
 enum class ForwardGate { kPaper /* translation and rotation */, kOff };
 
 /// Keys `odometry.*`.

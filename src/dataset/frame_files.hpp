@@ -81,7 +81,7 @@ namespace stemvo::dataset {
                                 const Camera& camera,
                                 const std::string& owner,
                                 const std::filesystem::path& camera_file);
-/// What the camera file says, mask and reader: `read_whole` gives the frames as they come, of the
+/// Adds the camera file's view, mask and reader: `read_whole` gives the frames as they come, of the
 /// view's full size. Errors: those of FrameView::create, naming the camera file, and of make_mask.
 [[nodiscard]] Expected<FrameView> add_view(
     FrameSource& frames,

@@ -72,10 +72,10 @@ struct FrameSource {
   /// size.
   std::function<Expected<cv::Mat>(std::size_t)> read;
   std::optional<StreamInfo> stream = std::nullopt;
-  /// Of a stream with a pose file: finds the true poses by the times of frames that were read.
+  /// A stream with a pose file finds the true poses by the times of frames that were read.
   std::function<Expected<GroundTruth>(const std::vector<double>& times_s)> match = nullptr;
 
-  /// Of a stream: the most there may be.
+  /// A stream: the most frames there may be.
   [[nodiscard]] std::size_t size() const { return stream ? stream->max_frames : files.size(); }
   /// The time of a frame; a stream knows it after the frame was read.
   [[nodiscard]] double time_s(std::size_t index) const {

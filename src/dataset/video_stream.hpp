@@ -38,7 +38,7 @@ class VideoStream {
   /// As the container says, which may be wrong; 0: it does not say.
   [[nodiscard]] std::size_t expected_frames() const;
   [[nodiscard]] double rate_hz() const;
-  /// Of frames without a time, instead of the container's: FFmpeg makes one up for raw MJPEG.
+  /// Frames without a time have this rate, not the container's: FFmpeg makes one up for raw MJPEG.
   void set_counted_rate(double rate_hz) { counted_hz_ = rate_hz; }
   [[nodiscard]] double counted_hz() const { return counted_hz_.value_or(rate_hz()); }
 

@@ -106,8 +106,8 @@ Expected<TimedPose> pose_from_quaternion_row(const std::vector<double>& n) {
   return TimedPose{n[0], Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3]))};
 }
 
-/// Of EuRoC's, whose quaternion begins with w, the columns behind the pose (velocity, biases) are
-/// not read.
+/// EuRoC's rows have a quaternion that begins with w, and columns behind the pose (velocity,
+/// biases), which are not read.
 Expected<TimedPose> parse_row(Format format, std::string_view given) {
   // Fewer commas are those of decimals.
   const bool has_commas = format != Format::kKitti || std::ranges::count(given, ',') == 11;

@@ -24,7 +24,7 @@ Context make_context(int flags) {
   if (context == nullptr) {
     throw std::bad_alloc();
   }
-  // Of what is not pixels: a packed text of a megabyte would be unpacked to a gigabyte.
+  // Chunks besides pixels stay small: a packed text of a megabyte would unpack to a gigabyte.
   constexpr std::size_t kMaxChunk = 1U << 23U;
   spng_set_chunk_limits(context.get(), kMaxChunk, kMaxChunk);
   return context;

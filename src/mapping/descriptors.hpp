@@ -68,7 +68,7 @@ class LookDescriptors {
     }
     return described;
   }
-  /// Those like what is seen in a view which this one magnifies and turns.
+  /// Descriptors like what is seen in a view which this one magnifies and turns.
   [[nodiscard]] std::span<const Descriptor> for_view(double magnification, double roll_rad);
 
  private:

@@ -123,7 +123,7 @@ class Estimator {
   [[nodiscard]] virtual std::optional<CameraEstimate> camera_estimate() const {
     return std::nullopt;
   }
-  /// What the next frames' pixels are freed of.
+  /// The next frames' pixels are freed of this.
   [[nodiscard]] virtual RadialLens lens() const { return {}; }
   /// As Odometry::landmarks_since; none where there is no window.
   [[nodiscard]] virtual LandmarkChanges landmarks_since(int /*version*/) const { return {}; }

@@ -21,7 +21,7 @@ struct SeenLandmarks {
 
   [[nodiscard]] int size() const { return static_cast<int>(points.size()); }
 };
-/// Those that the mask keeps.
+/// The landmarks that the mask keeps.
 [[nodiscard]] SeenLandmarks select(const SeenLandmarks& seen, const std::vector<char>& mask);
 [[nodiscard]] SeenLandmarks find_seen_landmarks(const Window& window, const Observations& frame);
 

@@ -80,7 +80,7 @@ class SelfCalibration {
   void approach_target();
   /// Pixels that were freed of another lens are freed of lens().
   void free_again(const RadialLens& before, Observations& points) const;
-  /// What a pixel at the image's side is moved by, px, for k1 and k2 of 1.
+  /// A pixel at the image's side is moved by so much, px, for k1 and k2 of 1.
   [[nodiscard]] Eigen::Vector2d side_px() const;
   [[nodiscard]] IntrinsicsDelta applied() const {
     IntrinsicsDelta change = IntrinsicsDelta::Zero();

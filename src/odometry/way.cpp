@@ -120,7 +120,7 @@ void WayScale::move(const Rigid3& cur_from_prev, double time_s, double pixel_uni
 
 bool WayScale::measure(Queue& queue, ScaleFilter& filter) const {
   auto& [waiting, joined] = queue;
-  // Those that have ended are one way.
+  // Ways that have ended are one.
   for (; !waiting.empty() && waiting.front().to_s <= stations_.back().time_s; waiting.pop_front()) {
     const Way& way = waiting.front();
     if (joined && std::abs(way.from_s - joined->to_s) < kSameTime_s) {

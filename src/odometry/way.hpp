@@ -27,7 +27,7 @@ struct Way {
   Kind kind = Kind::kDistance;
 };
 
-/// Of a speed of wheels that nobody told the sigma of.
+/// A speed of wheels has this sigma where nobody told one.
 [[nodiscard]] double usual_speed_sigma(double metres_per_s);
 
 /// Speeds and distances as a caller gives them, checked, made ways, and kept for the next frame.

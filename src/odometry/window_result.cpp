@@ -11,8 +11,8 @@
 
 namespace stemvo {
 
-// What the map that remembers changes, and the end of a frame: its scale, its uncertainty, what is
-// kept of it.
+// The map that remembers moves the world; a frame ends: its scale, its uncertainty, what is kept of
+// it.
 
 namespace {
 

@@ -10,8 +10,8 @@
 
 namespace stemvo {
 
-// What passes a camera that stands hides its landmarks. When it moves off, hundreds of tracks begun
-// meanwhile tell how it moves; the few landmarks that are left tell how far.
+// Cars that pass a camera that stands hide its landmarks. When it moves off, hundreds of tracks
+// begun meanwhile tell how it moves; the few landmarks that are left tell how far.
 
 namespace {
 
@@ -23,7 +23,7 @@ constexpr std::size_t kMinTracks = 50;
 /// of 0.3 px, to 3 %.
 constexpr double kTelling_px = 10.0;
 
-/// What a landmark tells of the way between two frames.
+/// A landmark's word on the way between two frames.
 struct ToldLength {
   double length;       ///< puts the landmark nearest to where it is seen
   double px_per_unit;  ///< moves the landmark
@@ -79,8 +79,7 @@ void WindowEstimator::keep_stand() {
   if (stand_.frame <= newest) {
     return;
   }
-  Keyframe keyframe{stand_.frame, trajectory_[static_cast<std::size_t>(stand_.frame)],
-                    std::move(points)};
+  Keyframe keyframe{stand_.frame, trajectory_[slot(stand_.frame)], std::move(points)};
   if (std::exchange(stand_.keyframe, stand_.frame) == newest) {
     leave(window_.keyframes.size() - 1, keyframe);
   }
@@ -93,7 +92,7 @@ const Keyframe* WindowEstimator::standing_keyframe(const Frame& frame,
                                                    const Observations& now) const {
   const auto stood = std::ranges::find(window_.keyframes, stand_.frame, &Keyframe::frame);
   const bool is_one = stood != window_.keyframes.end() &&
-                      frame.time_s - times_s_[static_cast<std::size_t>(stood->frame)] < kHidden_s &&
+                      frame.time_s - times_s_[slot(stood->frame)] < kHidden_s &&
                       find_seen_landmarks(window_, now).size() >= kMinLandmarks &&
                       common_points(stood->points, now).cur_uv.size() >= kMinTracks;
   return is_one ? &*stood : nullptr;

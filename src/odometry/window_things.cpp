@@ -35,8 +35,8 @@ constexpr double kMinTurn_px = 2.0;
 /// A landmark is near that the window sees under more than this.
 constexpr double kNear_rad = 1.5 * std::numbers::pi / 180.0;
 constexpr std::ptrdiff_t kMinNear = 20;
-/// What is far is a thing where it is so much of the image, and most of it is so far from where the
-/// near ones' pose has it, and so many times as far as they are.
+/// Far landmarks are a thing's where they are so much of the image, and most of them are so far
+/// from where the near ones' pose has them, and so many times as far as those.
 constexpr double kMinFar = 0.2;
 constexpr double kOff_px = 1.0;
 constexpr double kOffTimes = 3.0;

@@ -47,10 +47,10 @@ Rigid3 with_axes(const Rigid3& pose, const Eigen::Quaterniond& axes_from_camera)
   return turn.inverse() * pose * turn;
 }
 
-/// What the poses seem to be where they are not the camera's in the world, as world_from_camera,
-/// with x right, y down, z forward: camera_from_world, quaternions with w first, a robot's axes or
-/// OpenGL's. Nullopt: they fit the ground truth as they are, or nothing explains why they do not.
-/// Both have the same length. Lengths may have any unit.
+/// The convention that the poses seem to have where they are not the camera's in the world, as
+/// world_from_camera, with x right, y down, z forward: camera_from_world, quaternions with w first,
+/// a robot's axes or OpenGL's. Nullopt: they fit the ground truth as they are, or nothing explains
+/// why they do not. Both have the same length. Lengths may have any unit.
 std::optional<std::string> other_convention(std::span<const Rigid3> estimate,
                                             std::span<const Rigid3> ground_truth) {
   const Eigen::Quaterniond robot_from_camera(0.5, -0.5, 0.5, -0.5);

@@ -27,11 +27,11 @@ constexpr double kLeastSpread = 0.08;
 // The same: beyond it the light has changed, and the old limits would cut off or hide the image.
 constexpr double kJump = 0.2;
 
-// Of light_change().
+// light_change() goes by these.
 constexpr int kSquare_px = 16;  // of the channel
 constexpr Eigen::Index kLeastValues = 12;
 constexpr int kIterations = 12;
-// Of the spread of the values before: residuals below do not weigh more, and those that agree.
+// Shares of the spread of the values before: residuals below do not weigh more; values that agree.
 constexpr double kLeastResidual = 0.01;
 constexpr double kAgrees = 0.25;
 constexpr double kLeastShare = 0.6;  // of the values, that agree

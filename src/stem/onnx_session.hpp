@@ -59,7 +59,7 @@ class OnnxSession {
   [[nodiscard]] Status check_tensors();
   /// The graph's input or output. Error: it has more or none.
   [[nodiscard]] Expected<TensorInfo> read_tensor_info(bool is_input) const;
-  /// What a function of the runtime's table makes of the rest.
+  /// Calls a function of the runtime's table with the rest; owns what it makes.
   template <typename T, typename Create, typename... Given>
   [[nodiscard]] Expected<OnnxHandle<T>> make(void (*release)(T*),
                                              Create call,
