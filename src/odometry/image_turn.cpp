@@ -2,7 +2,6 @@
 #include "odometry/image_turn.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
@@ -19,7 +18,7 @@ namespace {
 
 /// The finest level is at least so wide, the coarsest has so many pixels at most.
 constexpr int kMinWidth_px = 40;
-constexpr Eigen::Index kMaxCoarsest = 600;
+constexpr int kMaxCoarsest = 600;
 /// Two images share at least so much of the area, and correlate there at least so well: by the
 /// right turn they do so by 0.96 and more, and a bright sky above a dark road by 0.84, whatever the
 /// turn.
@@ -33,174 +32,211 @@ constexpr double kMuchBetter = 0.05;
 constexpr double kMaxTurnSigma_px = 0.05;
 constexpr int kIterations = 8;
 constexpr double kConverged_px = 0.02;
-constexpr double kMinAhead = 0.2;  ///< beyond 78 degrees of turn: out of view
+/// Errors below count the same, gray values.
+constexpr double kLeastScale = 1e-3;
+constexpr float kMinAhead = 0.2F;  ///< beyond 78 degrees of turn: out of view
 
 using Level = ImageTurn::Level;
 
-/// Normalized, of two arrays of gray values; -1 where one is plain.
-double correlation(const auto& a, const auto& b) {
-  const auto size = static_cast<decltype(a.sum())>(a.size());
-  const auto sum_a = a.sum();
-  const auto sum_b = b.sum();
-  const auto variances =
-      (a.square().sum() - sum_a * sum_a / size) * (b.square().sum() - sum_b * sum_b / size);
-  return variances > 0 ? ((a * b).sum() - sum_a * sum_b / size) / std::sqrt(variances) : -1.0;
-}
+/// The sums that a correlation is made of.
+struct Sums {
+  double count = 0.0;
+  double a = 0.0;
+  double b = 0.0;
+  double aa = 0.0;
+  double bb = 0.0;
+  double ab = 0.0;
 
-/// Value and derivatives along x and y.
-using Sample = std::array<double, 3>;
+  /// Normalized; -1 where one of the two is plain.
+  [[nodiscard]] double correlation() const {
+    const double variances = (aa - a * a / count) * (bb - b * b / count);
+    return variances > 0.0 ? (ab - a * b / count) / std::sqrt(variances) : -1.0;
+  }
+};
 
-/// Bilinear; NaN beside the mask.
-Sample sample(const Eigen::ArrayXXf& pixels, const Eigen::Array2d& uv) {
-  const auto x = static_cast<Eigen::Index>(uv.x());
-  const auto y = static_cast<Eigen::Index>(uv.y());
-  const auto dx = static_cast<float>(uv.x() - static_cast<double>(x));
-  const auto dy = static_cast<float>(uv.y() - static_cast<double>(y));
-  const auto at = [&](Eigen::Index row, Eigen::Index col) {
-    return pixels(y + row, x + col) * (1.0F - dx) + pixels(y + row, x + col + 1) * dx;
-  };
-  const float value = at(0, 0) * (1.0F - dy) + at(1, 0) * dy;
-  const float before = at(-1, 0) * (1.0F - dy) + at(0, 0) * dy;
-  const float after = at(1, 0) * (1.0F - dy) + at(2, 0) * dy;
-  const float left = at(0, -1) * (1.0F - dy) + at(1, -1) * dy;
-  const float right = at(0, 1) * (1.0F - dy) + at(1, 1) * dy;
-  return {value, 0.5F * (right - left), 0.5F * (after - before)};
-}
+/// What alignment needs of each pixel of a level: its value, and how the value changes with the
+/// turn of the camera that sees it. Inverse composition (Baker and Matthews, 2004): one image's
+/// derivatives serve all iterations.
+struct Template {
+  using Row =
+      Eigen::Array<float, 8, 1>;  ///< by the turn (3), by gain, by bias; 5: the error's place
+  std::vector<Eigen::Vector2f> plane;
+  std::vector<Row> rows;
 
-/// Calls visit(value in prev, direction in cur, sample of cur) for each pixel of `prev` that `cur`
-/// shows with a margin of a pixel.
-template <typename Visit>
-void for_each_common(const Level& prev,
-                     const Level& cur,
-                     const Eigen::Matrix3d& cur_from_prev,
-                     const Visit& visit) {
-  const auto width = static_cast<double>(cur.pixels.cols());
-  const auto height = static_cast<double>(cur.pixels.rows());
-  for (Eigen::Index x = 0; x < prev.pixels.cols(); ++x) {
-    for (Eigen::Index y = 0; y < prev.pixels.rows(); ++y) {
-      const float value = prev.pixels(y, x);
-      const Eigen::Array2d at(static_cast<double>(x), static_cast<double>(y));
-      const Eigen::Vector2d plane = ((at - prev.center_px) / prev.focal_px).matrix();
-      const Eigen::Vector3d ray = cur_from_prev * plane.homogeneous();
-      const Eigen::Vector2d there = ray.head<2>() / ray.z();
-      const Eigen::Array2d uv = there.array() * cur.focal_px + cur.center_px;
-      if (ray.z() > kMinAhead && (uv >= 1.0).all() && uv.x() < width - 2.0 &&
-          uv.y() < height - 2.0 && !std::isnan(value)) {
-        const Sample now = sample(cur.pixels, uv);
-        if (!std::isnan(now[0] + now[1] + now[2])) {
-          visit(value, there, now);
+  explicit Template(const Level& level) {
+    for (int y = 1; y + 1 < level.pixels.rows; ++y) {
+      for (int x = 1; x + 1 < level.pixels.cols; ++x) {
+        const auto slope = [&](int dy, int dx) {
+          return 0.5F * (level.pixels(y + dy, x + dx) - level.pixels(y - dy, x - dx));
+        };
+        const float fx = slope(0, 1) * level.focal_px.x();
+        const float fy = slope(1, 0) * level.focal_px.y();
+        const float value = level.pixels(y, x);
+        if (std::isnan(value + fx + fy)) {
+          continue;
         }
+        const Eigen::Vector2f at = plane.emplace_back(
+            (Eigen::Array2f(static_cast<float>(x), static_cast<float>(y)) - level.center_px) /
+            level.focal_px);
+        const float along = fx * at.x() + fy * at.y();
+        rows.emplace_back() << -fy - along * at.y(), fx + along * at.x(), fy * at.x() - fx * at.y(),
+            -value, -1.0F, 0.0F, 0.0F, 0.0F;
+      }
+    }
+  }
+};
+
+/// Calls visit(index in `prev`, value in `cur`) for each of its pixels that `cur` shows.
+template <typename Visit>
+void for_each_common(const Template& prev,
+                     const Level& cur,
+                     const Eigen::Quaterniond& cur_from_prev,
+                     const Visit& visit) {
+  const Eigen::Matrix3f turn = cur_from_prev.toRotationMatrix().cast<float>();
+  const auto right = static_cast<float>(cur.pixels.cols - 1);
+  const auto bottom = static_cast<float>(cur.pixels.rows - 1);
+  const std::size_t stride = cur.pixels.step1();
+  for (std::size_t i = 0; i < prev.plane.size(); ++i) {
+    const Eigen::Vector3f ray = turn * prev.plane[i].homogeneous();
+    const float u = ray.x() / ray.z() * cur.focal_px.x() + cur.center_px.x();
+    const float v = ray.y() / ray.z() * cur.focal_px.y() + cur.center_px.y();
+    if (ray.z() > kMinAhead && u >= 0.0F && v >= 0.0F && u < right && v < bottom) {
+      const int x = static_cast<int>(u);
+      const int y = static_cast<int>(v);
+      const float du = u - static_cast<float>(x);
+      const float dv = v - static_cast<float>(y);
+      const float* const at = cur.pixels[y] + x;
+      const float above = at[0] + du * (at[1] - at[0]);
+      const float below = at[stride] + du * (at[stride + 1] - at[stride]);
+      if (const float now = above + dv * (below - above); !std::isnan(now)) {
+        visit(i, now);
       }
     }
   }
 }
 
-double num_seen(const Level& level) {
-  return static_cast<double>(level.pixels.size() - level.pixels.isNaN().count());
+double likeness(const Template& prev, const Level& cur, const Eigen::Quaterniond& cur_from_prev) {
+  Sums sums;
+  for_each_common(prev, cur, cur_from_prev, [&](std::size_t i, double now) {
+    const double value = -prev.rows[i][3];
+    ++sums.count;
+    sums.a += value;
+    sums.b += now;
+    sums.aa += value * value;
+    sums.bb += now * now;
+    sums.ab += value * now;
+  });
+  return sums.count < kMinShared * static_cast<double>(prev.rows.size()) ? -1.0
+                                                                         : sums.correlation();
 }
 
-float mean_of(const Level& level) {
-  return level.pixels.isNaN().select(0.0F, level.pixels).sum() /
-         static_cast<float>(num_seen(level));
+double mean_of(const Level& level) {
+  return cv::mean(level.pixels, level.pixels == level.pixels)[0];
 }
 
-/// Less their mean; 0 behind the mask.
-Eigen::ArrayXXf centered(const Level& level) {
-  return level.pixels.isNaN().select(0.0F, level.pixels - mean_of(level));
-}
-
-double likeness(const Level& prev, const Level& cur, const Eigen::Quaterniond& cur_from_prev) {
-  std::vector<double> values;
-  std::vector<double> now;
-  for_each_common(prev, cur, cur_from_prev.toRotationMatrix(),
-                  [&](float value, const Eigen::Vector2d&, const Sample& sampled) {
-                    values.push_back(value);
-                    now.push_back(sampled[0]);
-                  });
-  const auto size = std::ssize(values);
-  using Values = Eigen::Map<const Eigen::ArrayXd>;
-  return static_cast<double>(size) < kMinShared * num_seen(prev)
-             ? -1.0
-             : correlation(Values(values.data(), size), Values(now.data(), size));
+double mean_of(const Template& level) {
+  double sum = 0.0;
+  for (const Template::Row& row : level.rows) {
+    sum -= row[3];
+  }
+  return sum / static_cast<double>(level.rows.size());
 }
 
 /// Gauss-Newton from `turn`, cur_from_prev; gain and bias of the gray values are solved for, and
 /// what differs by more than the others (Cauchy) counts less. Returns the error of the direction
 /// that is told worst, 1 sigma, pixels.
-double align_level(const Level& prev, const Level& cur, Eigen::Quaterniond& turn) {
+double align_level(const Template& prev, const Level& cur, Eigen::Quaterniond& turn) {
   using Vector5d = Eigen::Matrix<double, 5, 1>;
   using Matrix5d = Eigen::Matrix<double, 5, 5>;
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
   double gain = 1.0;
-  double bias = static_cast<double>(mean_of(cur) - mean_of(prev));
-  double scale = std::numeric_limits<double>::infinity();
-  double sigma_px = std::numeric_limits<double>::infinity();
+  double bias = mean_of(cur) - mean_of(prev);
+  double scale = kUnknown;
+  double sigma_px = kUnknown;
   for (int i = 0; i < kIterations; ++i) {
-    Matrix5d normal = Matrix5d::Zero();
-    Vector5d right = Vector5d::Zero();
-    double sum = 0.0;
+    Eigen::Array<float, 8, 6> products = Eigen::Array<float, 8, 6>::Zero();
+    const auto gain_now = static_cast<float>(gain);
+    const auto bias_now = static_cast<float>(bias);
+    const auto inverse_scale = static_cast<float>(1.0 / std::max(scale, kLeastScale));
+    float sum = 0.0F;
     int num = 0;
-    for_each_common(prev, cur, turn.toRotationMatrix(),
-                    [&](float value, const Eigen::Vector2d& at, const Sample& sampled) {
-                      const auto [now, gx, gy] = sampled;
-                      const double off = now - gain * value - bias;
-                      const double fx = gx * cur.focal_px.x();
-                      const double fy = gy * cur.focal_px.y();
-                      const double along = fx * at.x() + fy * at.y();
-                      Vector5d row;
-                      row << -fy - along * at.y(), fx + along * at.x(), fy * at.x() - fx * at.y(),
-                          -static_cast<double>(value), -1.0;
-                      // Of two equal images the scale is 0 too.
-                      const double weight =
-                          off == 0.0 ? 1.0 : 1.0 / (1.0 + off * off / (scale * scale));
-                      normal.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
-                      right -= weight * off * row;
-                      sum += std::abs(off);
-                      ++num;
-                    });
-    const Eigen::LDLT<Matrix5d, Eigen::Lower> solver(normal);
-    const Vector5d step = solver.solve(right);
+    for_each_common(prev, cur, turn, [&](std::size_t k, float now) {
+      Template::Row row = prev.rows[k];
+      const float off = now + gain_now * row[3] - bias_now;
+      const float weight = 1.0F / (1.0F + std::pow(off * inverse_scale, 2.0F));
+      row[5] = off;
+      for (int column = 0; column < 6; ++column) {
+        products.col(column) += weight * row[column] * row;
+      }
+      sum += std::abs(off);
+      ++num;
+    });
+    const Matrix5d normal = products.topLeftCorner<5, 5>().matrix().cast<double>();
+    const Eigen::LDLT<Matrix5d> solver(normal);
+    const Vector5d step = -solver.solve(products.col(5).head<5>().matrix().cast<double>());
     if (num < 5 || !step.allFinite()) {
-      return std::numeric_limits<double>::infinity();
+      return kUnknown;
     }
-    turn = so3_exp(step.head<3>()) * turn;
+    const Eigen::Vector3d by =
+        step.head<3>() / gain;  // of what `prev`, gain times as strong, shows
+    turn = turn * so3_exp(by);
+    const Eigen::Matrix3d variances = solver.solve(Matrix5d::Identity()).topLeftCorner<3, 3>();
+    const double mean = static_cast<double>(sum) / num;
+    sigma_px = cur.focal_px.mean() * std::sqrt(variances.trace()) * mean / gain;
     gain += step[3];
     bias += step[4];
-    scale = 2.0 * sum / num;
-    const Eigen::Matrix3d variances =
-        solver.solve(Matrix5d::Identity()).topLeftCorner<3, 3>() * std::pow(sum / num, 2);
-    sigma_px = cur.focal_px.mean() * std::sqrt(variances.trace());
-    if (i > 0 && step.head<3>().norm() * cur.focal_px.mean() < kConverged_px) {
+    scale = 2.0 * mean;
+    if (!(gain > 0.0)) {
+      return kUnknown;
+    }
+    if (i > 0 && by.norm() * cur.focal_px.mean() < kConverged_px) {
       break;
     }
   }
   return sigma_px;
 }
 
+/// Less their mean; 0 behind the mask.
+cv::Mat1f centered(const Level& level) {
+  cv::Mat1f values = level.pixels - mean_of(level);
+  cv::patchNaNs(values);
+  return values;
+}
+
 /// The turn that shifts the middle of the image by whole pixels, so that the two correlate best.
 Eigen::Quaterniond best_shift(const Level& prev, const Level& cur) {
-  const int width = static_cast<int>(prev.pixels.cols());
-  const int height = static_cast<int>(prev.pixels.rows());
-  const Eigen::ArrayXXf before = centered(prev);
-  const Eigen::ArrayXXf now = centered(cur);
+  const cv::Size size = prev.pixels.size();
+  const cv::Mat1f before = centered(prev);
+  const cv::Mat1f now = centered(cur);
+  cv::Mat1d sum_before, squares_before, sum_now, squares_now;
+  cv::integral(before, sum_before, squares_before, CV_64F, CV_64F);
+  cv::integral(now, sum_now, squares_now, CV_64F, CV_64F);
+  const auto inside = [](const cv::Mat1d& sums, const cv::Rect& part) {
+    return sums(part.br()) - sums(part.y, part.br().x) - sums(part.br().y, part.x) +
+           sums(part.tl());
+  };
   double best = -1.0;
-  Eigen::Array2d shift = Eigen::Array2d::Zero();
-  for (int dx = -width / 2; dx <= width / 2; ++dx) {
-    for (int dy = -height / 2; dy <= height / 2; ++dy) {
-      const int cols = width - std::abs(dx);
-      const int rows = height - std::abs(dy);
-      const auto a = before.block(std::max(0, -dy), std::max(0, -dx), rows, cols);
-      const auto b = now.block(std::max(0, dy), std::max(0, dx), rows, cols);
-      if (rows * cols < kMinShared * width * height) {
+  Eigen::Array2f shift = Eigen::Array2f::Zero();
+  for (int dx = -size.width / 2; dx <= size.width / 2; ++dx) {
+    for (int dy = -size.height / 2; dy <= size.height / 2; ++dy) {
+      const cv::Size common(size.width - std::abs(dx), size.height - std::abs(dy));
+      if (common.area() < kMinShared * size.area()) {
         continue;
       }
-      if (const double value = correlation(a, b); value > best) {
+      const cv::Rect a({std::max(0, -dx), std::max(0, -dy)}, common);
+      const cv::Rect b({std::max(0, dx), std::max(0, dy)}, common);
+      const Sums sums{
+          static_cast<double>(common.area()), inside(sum_before, a),  inside(sum_now, b),
+          inside(squares_before, a),          inside(squares_now, b), before(a).dot(now(b))};
+      if (const double value = sums.correlation(); value > best) {
         best = value;
-        shift = {dx, dy};
+        shift = {static_cast<float>(dx), static_cast<float>(dy)};
       }
     }
   }
-  const Eigen::Vector2d to = (shift / cur.focal_px).matrix();
-  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), to.homogeneous());
+  const Eigen::Vector2f to = (shift / cur.focal_px).matrix();
+  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(),
+                                            to.homogeneous().cast<double>());
 }
 
 }  // namespace
@@ -231,14 +267,12 @@ std::vector<Level> ImageTurn::small_levels(const ImagePyramid& image) const {
     if (!mask.empty()) {
       values.setTo(std::numeric_limits<float>::quiet_NaN(), mask == 0);
     }
-    Level level;
-    using Rows = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    level.pixels = Eigen::Map<const Rows>(values.ptr<float>(), values.rows, values.cols);
-    level.focal_px = Eigen::Array2d(camera_.fx_px, camera_.fy_px) / map.scale.array();
-    level.center_px =
+    const Eigen::Array2d focal_px =
+        Eigen::Array2d(camera_.fx_px, camera_.fy_px) / map.scale.array();
+    const Eigen::Array2d center_px =
         (Eigen::Array2d(camera_.cx_px, camera_.cy_px) - map.offset_px.array()) / map.scale.array();
-    levels.push_back(std::move(level));
-    if (levels.back().pixels.size() <= kMaxCoarsest) {
+    levels.push_back({values, focal_px.cast<float>(), center_px.cast<float>()});
+    if (values.size().area() <= kMaxCoarsest) {
       return levels;
     }
     pixels = halved(pixels);
@@ -249,13 +283,14 @@ std::vector<Level> ImageTurn::small_levels(const ImagePyramid& image) const {
 std::optional<Eigen::Quaterniond> ImageTurn::align(const ImagePyramid& image,
                                                    double interval_s,
                                                    const std::optional<Eigen::Quaterniond>& hint) {
-  const std::vector<Level> prev = std::exchange(last_, small_levels(image));
+  const std::vector<Level> before = std::exchange(last_, small_levels(image));
   expected_ = so3_exp(interval_s * rad_per_s_);
   rad_per_s_.setZero();
   refutes_guess_ = false;
-  if (prev.size() != last_.size() || prev.back().pixels.size() != last_.back().pixels.size()) {
+  if (before.size() != last_.size() || before.back().pixels.size() != last_.back().pixels.size()) {
     return std::nullopt;
   }
+  const std::vector<Template> prev(before.begin(), before.end());
   Eigen::Quaterniond turn = expected_.conjugate();
   double best = likeness(prev.back(), last_.back(), turn);
   const auto compare = [&](const Eigen::Quaterniond& start, double margin) {
@@ -269,7 +304,7 @@ std::optional<Eigen::Quaterniond> ImageTurn::align(const ImagePyramid& image,
     compare(hint->conjugate(), 0.0);
   }
   if (best < kLikely) {
-    compare(best_shift(prev.back(), last_.back()), kMuchBetter);
+    compare(best_shift(before.back(), last_.back()), kMuchBetter);
   }
   double sigma_px = 0.0;
   for (std::size_t i = prev.size(); i-- > 0;) {

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <opencv2/core.hpp>
 
 #include "features/front_end.hpp"
 #include "stemvo/camera.hpp"
@@ -29,11 +30,11 @@ class ImageTurn {
   /// it found.
   [[nodiscard]] bool refutes_guess() const { return refutes_guess_; }
 
-  /// A gray image and the pinhole camera that it was taken by.
+  /// A small gray image and the pinhole camera that it was taken by.
   struct Level {
-    Eigen::ArrayXXf pixels;  ///< rows, columns; NaN: behind the mask
-    Eigen::Array2d focal_px;
-    Eigen::Array2d center_px;
+    cv::Mat1f pixels;  ///< NaN: behind the mask
+    Eigen::Array2f focal_px;
+    Eigen::Array2f center_px;
   };
 
  private:

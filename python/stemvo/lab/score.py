@@ -8,7 +8,6 @@ import hashlib
 import pathlib
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 import stemvo
 from stemvo import _core
@@ -98,9 +97,9 @@ ERRORS = ("t_rel_percent", "r_rel_deg_per_100m", "average_offset_m", "E_t_m", "E
 
 def mean_motion(poses):
     """E_t in m and E_r in degrees: between consecutive poses. They take no ground truth: a camera that stands scores 0."""
-    turns = Rotation.from_matrix(poses[:, :3, :3])
     lengths = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
-    return float(lengths.mean()), float(np.degrees((turns[:-1].inv() * turns[1:]).magnitude().mean()))
+    chords = np.linalg.norm(np.diff(poses[:, :3, :3], axis=0), axis=(1, 2)) / np.sqrt(8.0)  # |R - S| = sqrt(8) sin(angle / 2)
+    return float(lengths.mean()), float(np.degrees(2.0 * np.arcsin(np.minimum(chords, 1.0))).mean())
 
 
 def errors_of(trajectory, truth):
