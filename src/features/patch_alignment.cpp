@@ -40,54 +40,47 @@ bool is_in_image(const BorderedImage& image, float x, float y, float outside_px 
          y <= static_cast<float>(image.height - 1) + outside_px;
 }
 
+using PatchVector = Eigen::Map<Eigen::Matrix<float, kFineSide * kFineSide, 1>>;
+using PatchArray = Eigen::Map<Eigen::Array<float, kFineSide, kFineSide, Eigen::RowMajor>>;
+static_assert(kCoarseSide == kFineSide);
+
+/// Values and their central differences, each 8x8.
+void differentiate(const ValuesAround& around, float* value, float* gx, float* gy) {
+  using Around = Eigen::Array<float, kSideAround, kSideAround, Eigen::RowMajor>;
+  const Eigen::Map<const Around> all(around.data());
+  const auto part = [&](int row, int col) { return all.block<kFineSide, kFineSide>(row, col); };
+  PatchArray{value} = part(1, 1);
+  PatchArray{gx} = 0.5F * (part(1, 2) - part(1, 0));
+  PatchArray{gy} = 0.5F * (part(2, 1) - part(0, 1));
+}
+
 void cut_coarse(const BorderedImage& image, float x, float y, Patch::Coarse& coarse) {
-  const PatchKernels& kernels = patch_kernels();
-  const float left = x - 0.5F * (kCoarseSide - 1);
-  const float top = y - 0.5F * (kCoarseSide - 1);
-  kernels.sample_coarse(image, left, top, coarse.value);
-  CoarseValues before;
-  kernels.sample_coarse(image, left - 1.0F, top, before);
-  kernels.sample_coarse(image, left + 1.0F, top, coarse.gx);
-  float xx = 0.0F;
-  float xy = 0.0F;
-  float yy = 0.0F;
-  for (std::size_t i = 0; i < before.size(); ++i) {
-    coarse.gx[i] = 0.5F * (coarse.gx[i] - before[i]);
-  }
-  kernels.sample_coarse(image, left, top - 1.0F, before);
-  kernels.sample_coarse(image, left, top + 1.0F, coarse.gy);
-  for (std::size_t i = 0; i < before.size(); ++i) {
-    coarse.gy[i] = 0.5F * (coarse.gy[i] - before[i]);
-    xx += coarse.gx[i] * coarse.gx[i];
-    xy += coarse.gx[i] * coarse.gy[i];
-    yy += coarse.gy[i] * coarse.gy[i];
-  }
+  constexpr float kHalf = 0.5F * (kCoarseSide - 1);
+  ValuesAround around;
+  patch_kernels().sample_coarse_around(image, x - kHalf, y - kHalf, around);
+  differentiate(around, coarse.value.data(), coarse.gx.data(), coarse.gy.data());
+  const PatchVector gx(coarse.gx.data());
+  const PatchVector gy(coarse.gy.data());
+  const float xx = gx.squaredNorm();
+  const float xy = gx.dot(gy);
+  const float yy = gy.squaredNorm();
   const float determinant = xx * yy - xy * xy;
   const float inverse =
       determinant > kMinDeterminant * xx * yy && determinant > 0.0F ? 1.0F / determinant : 0.0F;
   coarse.inverse_hessian = {yy * inverse, -xy * inverse, xx * inverse};
 }
 
-using FineVector = Eigen::Map<Eigen::Matrix<float, kFineSide * kFineSide, 1>>;
-
 bool cut_fine(const BorderedImage& image, float x, float y, Patch& patch) {
-  const PatchKernels& kernels = patch_kernels();
-  FineValues before;
-  FineValues after;
-  kernels.sample_fine(image, {x, y}, patch.value);
-  FineVector value(patch.value.data());
+  ValuesAround around;
+  patch_kernels().sample_fine_around(image, x, y, around);
+  Eigen::Matrix<float, kFineSide * kFineSide, 4> columns;
+  differentiate(around, patch.value.data(), columns.col(0).data(), columns.col(1).data());
+  PatchVector value(patch.value.data());
   value.array() -= value.mean();
   patch.norm_sq = value.squaredNorm();
   if (!(patch.norm_sq > kMinNormSq)) {
     return false;
   }
-  Eigen::Matrix<float, kFineSide * kFineSide, 4> columns;
-  kernels.sample_fine(image, {x - 1.0F, y}, before);
-  kernels.sample_fine(image, {x + 1.0F, y}, after);
-  columns.col(0) = 0.5F * (FineVector(after.data()) - FineVector(before.data()));
-  kernels.sample_fine(image, {x, y - 1.0F}, before);
-  kernels.sample_fine(image, {x, y + 1.0F}, after);
-  columns.col(1) = 0.5F * (FineVector(after.data()) - FineVector(before.data()));
   for (int i = 0; i < kFineSide * kFineSide; ++i) {
     const int row = i / kFineSide;
     const float dx = static_cast<float>(i % kFineSide) - 0.5F * (kFineSide - 1);
@@ -104,12 +97,12 @@ bool cut_fine(const BorderedImage& image, float x, float y, Patch& patch) {
   }
   const Eigen::Matrix<float, 4, kFineSide * kFineSide> step = solver.solve(columns.transpose());
   for (std::size_t k = 0; k < 4; ++k) {
-    FineVector(patch.step[k].data()) = step.row(static_cast<Eigen::Index>(k)).transpose();
+    PatchVector(patch.step[k].data()) = step.row(static_cast<Eigen::Index>(k)).transpose();
   }
   const Eigen::Matrix<float, 2, kFineSide * kFineSide> translation =
       hessian.topLeftCorner<2, 2>().inverse() * columns.leftCols<2>().transpose();
   for (std::size_t k = 0; k < 2; ++k) {
-    FineVector(patch.translation_step[k].data()) =
+    PatchVector(patch.translation_step[k].data()) =
         translation.row(static_cast<Eigen::Index>(k)).transpose();
     patch.translation_step[k + 2].fill(0.0F);
   }

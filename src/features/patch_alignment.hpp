@@ -29,6 +29,9 @@ inline constexpr int kFineSide = 8;
 using CoarseValues = std::array<float, kCoarseSide * kCoarseSide>;
 using FineValues = std::array<float, kFineSide * kFineSide>;
 using FineColumns = std::array<FineValues, 4>;
+/// A patch and a margin of one sample, for derivatives.
+inline constexpr int kSideAround = kFineSide + 2;
+using ValuesAround = std::array<float, kSideAround * kSideAround>;
 
 /// Values and their gradient.
 struct CoarsePatch {
@@ -42,11 +45,15 @@ struct CoarsePatch {
 struct PatchKernels {
   /// Bilinear samples at (x + i, y + j), i and j from 0 to 7.
   void (*sample_coarse)(const BorderedImage& image, float x, float y, CoarseValues& values);
+  /// i and j from -1 to 8.
+  void (*sample_coarse_around)(const BorderedImage& image, float x, float y, ValuesAround& values);
   /// sums[0] = sum of gx e and sums[1] = of gy e, where e = sample - value, samples as above.
   void (*coarse_sums)(
       const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums);
   /// Catmull-Rom samples at the similarity's images of (i - 3.5, j - 3.5), i and j from 0 to 7.
   void (*sample_fine)(const BorderedImage& image, const Similarity& warp, FineValues& values);
+  /// Upright, i and j from -1 to 8.
+  void (*sample_fine_around)(const BorderedImage& image, float x, float y, ValuesAround& values);
   /// sums[k] = sum of columns[k] samples; sums[4] of samples; [5] of samples^2; [6] of samples
   /// value.
   void (*fine_sums)(const FineValues& samples,

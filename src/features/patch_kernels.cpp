@@ -93,6 +93,20 @@ STEMVO_INLINE void sample_coarse(const BorderedImage& image,
   }
 }
 
+STEMVO_INLINE void sample_coarse_around(const BorderedImage& image,
+                                        float x,
+                                        float y,
+                                        ValuesAround& values) {
+  const Bilinear at = bilinear(image, x - 1.0F, y - 1.0F);
+  for (int j = 0; j < kSideAround; ++j) {
+    for (const int i : {0, kSideAround - kLanes}) {
+      Float8 row;
+      sample_row({at.top_left + i, at.stride, at.w00, at.w01, at.w10, at.w11}, j, row);
+      store(row, values.data() + j * kSideAround + i);
+    }
+  }
+}
+
 STEMVO_INLINE void coarse_sums(
     const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums) {
   const Bilinear at = bilinear(image, x, y);
@@ -150,14 +164,12 @@ STEMVO_INLINE void fine_sums(const FineValues& values,
   sums[6] = sum(by_value);
 }
 
-/// Neither turned nor scaled: one set of weights for all samples, rows first.
-STEMVO_INLINE void sample_fine_upright(const BorderedImage& image,
-                                       float center_x,
-                                       float center_y,
-                                       FineValues& values) {
+/// Neither turned nor scaled: one set of weights for all samples, rows first. Eight columns of
+/// `num_rows` rows from (x, y) on, to every `width`-th of the values.
+template <int num_rows>
+STEMVO_INLINE void sample_fine_upright(
+    const BorderedImage& image, float x, float y, float* values, int width) {
   constexpr int kTaps = 4;
-  const float x = center_x - 0.5F * (kFineSide - 1);
-  const float y = center_y - 0.5F * (kFineSide - 1);
   const float column = std::floor(x);
   const float row = std::floor(y);
   float wx[kTaps];
@@ -166,7 +178,7 @@ STEMVO_INLINE void sample_fine_upright(const BorderedImage& image,
   catmull_rom(y - row, wy);
   const std::uint8_t* pixel = image.origin + (static_cast<std::ptrdiff_t>(row) - 1) * image.stride +
                               static_cast<std::ptrdiff_t>(column) - 1;
-  Float8 rows[kFineSide + kTaps - 1];
+  Float8 rows[num_rows + kTaps - 1];
   for (Float8& in_row : rows) {
     Float8 taps[kTaps];
     for (int i = 0; i < kTaps; ++i) {
@@ -175,10 +187,30 @@ STEMVO_INLINE void sample_fine_upright(const BorderedImage& image,
     in_row = wx[0] * taps[0] + wx[1] * taps[1] + wx[2] * taps[2] + wx[3] * taps[3];
     pixel += image.stride;
   }
-  for (int j = 0; j < kFineSide; ++j) {
+  for (int j = 0; j < num_rows; ++j) {
     const Float8 samples =
         wy[0] * rows[j] + wy[1] * rows[j + 1] + wy[2] * rows[j + 2] + wy[3] * rows[j + 3];
-    store(samples, values.data() + j * kLanes);
+    store(samples, values + j * width);
+  }
+}
+
+constexpr float kHalfFine = 0.5F * (kFineSide - 1);
+
+STEMVO_INLINE void sample_fine_upright(const BorderedImage& image,
+                                       float center_x,
+                                       float center_y,
+                                       FineValues& values) {
+  sample_fine_upright<kFineSide>(image, center_x - kHalfFine, center_y - kHalfFine, values.data(),
+                                 kFineSide);
+}
+
+STEMVO_INLINE void sample_fine_around(const BorderedImage& image,
+                                      float center_x,
+                                      float center_y,
+                                      ValuesAround& values) {
+  for (const int i : {0, kSideAround - kLanes}) {
+    sample_fine_upright<kSideAround>(image, center_x - kHalfFine - 1.0F + static_cast<float>(i),
+                                     center_y - kHalfFine - 1.0F, values.data() + i, kSideAround);
   }
 }
 
@@ -216,8 +248,9 @@ void sample_fine_portable(const BorderedImage& image, const Similarity& warp, Fi
   }
 }
 
-constexpr PatchKernels kPortable{portable_copy<sample_coarse>, portable_copy<coarse_sums>,
-                                 sample_fine_portable, portable_copy<fine_sums>};
+constexpr PatchKernels kPortable{
+    portable_copy<sample_coarse>, portable_copy<sample_coarse_around>, portable_copy<coarse_sums>,
+    sample_fine_portable,         portable_copy<sample_fine_around>,   portable_copy<fine_sums>};
 
 #if defined(__x86_64__)
 STEMVO_AVX2 STEMVO_INLINE void catmull_rom(__m256 t, __m256* w) {
@@ -276,8 +309,9 @@ STEMVO_AVX2 void sample_fine_avx2(const BorderedImage& image,
   }
 }
 
-constexpr PatchKernels kAvx2{avx2_copy<sample_coarse>, avx2_copy<coarse_sums>, sample_fine_avx2,
-                             avx2_copy<fine_sums>};
+constexpr PatchKernels kAvx2{avx2_copy<sample_coarse>,      avx2_copy<sample_coarse_around>,
+                             avx2_copy<coarse_sums>,        sample_fine_avx2,
+                             avx2_copy<sample_fine_around>, avx2_copy<fine_sums>};
 #endif
 
 }  // namespace
