@@ -57,7 +57,7 @@ class OdometryHandle {
 
   /// Is told in words what is odd about the camera, when tracking begins, ends and recovers, when
   /// the scale is believed and when no more, and why a frame could not be seen. Before the first
-  /// frame.
+  /// frame. It may not throw: what it throws is thrown by process(), then and ever after.
   void set_log(Log log);
 
   /// Landmarks that came, moved or went since `version` of the map; 0: all. They are seen from at
@@ -116,7 +116,7 @@ class Odometry : public OdometryHandle {
                                               const FrameHints& hints = {});
 
   /// A new world, as after create(): the same network and the given camera, whatever was learnt of
-  /// it; times may begin anew.
+  /// it; times may begin anew, versions and ids of the map do.
   void reset();
 
  private:

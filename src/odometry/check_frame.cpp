@@ -92,10 +92,15 @@ Status check_camera(const Camera& camera, const std::string& owner) {
                             : ""));
   }
   STEMVO_TRY(check_center(camera, owner));
-  if (!std::ranges::all_of(camera.distortion_coefficients,
-                           [](double value) { return std::isfinite(value); })) {
-    return fail(fmt::format("{}: expected finite distortion coefficients, found [{}]", owner,
-                            fmt::join(camera.distortion_coefficients, ", ")));
+  const auto& k = camera.distortion_coefficients;
+  const auto num = static_cast<std::size_t>(camera.distortion == Distortion::kNone          ? 0
+                                            : camera.distortion == Distortion::kEquidistant ? 4
+                                                                                            : 12);
+  if (!std::ranges::all_of(k, [](double value) { return std::isfinite(value); }) ||
+      std::any_of(k.begin() + num, k.end(), [](double value) { return value != 0.0; })) {
+    return fail(fmt::format(
+        "{}: expected finite distortion coefficients, 0 beyond the {} of its model, found [{}]",
+        owner, num, fmt::join(k, ", ")));
   }
   return {};
 }

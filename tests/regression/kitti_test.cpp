@@ -98,6 +98,12 @@ TEST_F(RoadOfClip, IsNotBelievedByACameraOnItsSide) {
   EXPECT_EQ(believed(), 0.0);
 }
 
+TEST_F(RoadOfClip, IsNotBelievedBySoFewGrayLevels) {
+  const ProgramResult done = run([](cv::Mat& image) { image = 126 + image / 64; }, kCx_px, kCy_px);
+  EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
+  EXPECT_EQ(believed(), 0.0);
+}
+
 class HandHeld : public NeedsClips {};
 
 TEST_F(HandHeld, ARoomHasNoRoad) {

@@ -57,7 +57,7 @@ TEST_F(Speeds, MakeMetresOfAWalk) {
   const fs::path walk =
       render_once("small_walk", {"--walk", "--frames", "150", "--width", "320", "--height", "240"});
   const Words lengths = {"--set", "evaluation.segment_lengths_m=[1, 2]"};
-  EXPECT_LE(t_rel_with(walk / "sequences/00", 0.0, lengths), 1.0);
+  EXPECT_LE(t_rel_with(walk / "sequences/00", 0.0, lengths), 0.6);
   const double biased = t_rel_with(walk / "sequences/00", 0.05, lengths);
   EXPECT_GE(biased, 4.0);
   EXPECT_LE(biased, 6.0);

@@ -91,6 +91,9 @@ TEST(OdometryCreate, ALensIsTakenOutOfTheImagesAndTheMaskInside) {
   EXPECT_THAT(error_of({}, distorted), HasSubstr("camera: expected distortion coefficients"));
   distorted.distortion_coefficients = {std::numeric_limits<double>::quiet_NaN()};
   EXPECT_THAT(error_of({}, distorted), HasSubstr("camera: expected finite distortion"));
+  distorted.distortion = Distortion::kNone;
+  distorted.distortion_coefficients = {-0.2};
+  EXPECT_THAT(error_of({}, distorted), HasSubstr("0 beyond the 0 of its model, found [-0.2"));
 }
 
 TEST(OdometryCreate, MetresAreClaimedOnlyWithAHeight) {

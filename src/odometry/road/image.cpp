@@ -101,6 +101,15 @@ Channel road_channel(const cv::Mat& image, const Camera& camera) {
   return channel;
 }
 
+bool shows_texture(const cv::Mat& image, const Camera& camera) {
+  constexpr double kMinSpread = 2.0;  // gray levels; four of them, evenly used, have 1.1
+  const int horizon = std::clamp(static_cast<int>(camera.cy_px), 0, image.rows - 1);
+  cv::Scalar mean;
+  cv::Scalar spread;
+  cv::meanStdDev(image.rowRange(horizon, image.rows), mean, spread);
+  return *std::ranges::max_element(spread.val) > kMinSpread;
+}
+
 RoadImage make_road_image(const ChannelImage& image, const Camera& camera) {
   RoadImage road{image.pixels, image.map, {}};
   road.full.camera = camera_in(camera, image.map, image.pixels.size());
