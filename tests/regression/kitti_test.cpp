@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "support/kitti_clips.hpp"
+#include "support/state_runs.hpp"
 #include "support/test.hpp"
 
 namespace stemvo {
@@ -102,6 +103,40 @@ TEST_F(RoadOfClip, IsNotBelievedBySoFewGrayLevels) {
   const ProgramResult done = run([](cv::Mat& image) { image = 126 + image / 64; }, kCx_px, kCy_px);
   EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
   EXPECT_EQ(believed(), 0.0);
+}
+
+class SigmaOfScale : public NeedsClips {};
+
+TEST_F(SigmaOfScale, IsAsLargeAsTheErrors) {
+  succeeded(run_stemvo({"run", (shared_data() / "kitti/sequences/03").string(), "--out",
+                        folder_ / "result", "--quiet"}));
+  const std::string csv = read_file(folder_ / "result/frames.csv");
+  const Words sigmas = test::column(csv, "scale_sigma");
+  const Words states = test::column(csv, "scale_state");
+  const auto path = read_kitti_trajectory(folder_ / "result/trajectory_kitti.txt").value();
+  const auto truth = read_kitti_trajectory(shared_data() / "kitti/poses/03.txt").value();
+  const auto length = [](const Trajectory& poses, std::size_t from, std::size_t to) {
+    double sum = 0.0;
+    for (std::size_t i = from; i < to; ++i) {
+      sum += (poses[i + 1].translation - poses[i].translation).norm();
+    }
+    return sum;
+  };
+  // Over 24 steps, as those of one frame are not the scale's errors alone.
+  constexpr std::size_t kReach = 12;
+  double squares = 0.0;
+  int num = 0;
+  for (std::size_t i = 2 * kReach; i + kReach < sigmas.size(); ++i) {
+    if (states[i] == "measured") {
+      const double log_ratio =
+          std::log(length(path, i - kReach, i + kReach) / length(truth, i - kReach, i + kReach));
+      squares += std::pow(log_ratio / std::stod(sigmas[i]), 2);
+      ++num;
+    }
+  }
+  ASSERT_GT(num, 300);
+  EXPECT_GT(std::sqrt(squares / num), 0.5);
+  EXPECT_LT(std::sqrt(squares / num), 2.0);
 }
 
 class HandHeld : public NeedsClips {};
