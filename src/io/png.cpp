@@ -98,7 +98,8 @@ Expected<cv::Mat> decode_png(Bytes bytes,
                              bool as_color,
                              const WantedSize& wanted,
                              bool keeps_16_bits) {
-  const Context png = make_context(0);
+  // The chunks have checksums, too.
+  const Context png = make_context(SPNG_CTX_IGNORE_ADLER32);
   spng_ihdr header{};
   cv::Mat image;
   if (spng_set_png_buffer(png.get(), bytes.data(), bytes.size()) == SPNG_OK &&
