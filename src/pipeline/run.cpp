@@ -107,6 +107,7 @@ Expected<RunSummary> finish_run(const Run& run, const RunProgress& progress) {
   MetricsReport report;
   Status written = pipeline::write_results(run, done, report);
   add_line(done.warnings, warn_of_road(report));
+  add_line(done.warnings, warn_of_gaps(report));
   const auto late = run.beside.warnings(done.frames.front().time_s, done.frames.back().time_s);
   done.warnings.insert(done.warnings.end(), late.begin(), late.end());
   return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,

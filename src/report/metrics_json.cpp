@@ -16,6 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kFewBelieved = 0.5;  ///< a smaller share is warned of
+constexpr double kMostTracked = 0.5;  ///< the same
 constexpr double kInPlace = 0.95;     ///< a larger share of such frames is told
 
 std::string scale_explained(const MetricsReport& report) {
@@ -233,6 +234,15 @@ std::array<std::string, 10> metric_texts(const Metrics& metrics) {
           format_length(ate.sim3_m, 2),
           fmt::format("{:.4f}", metrics.rpe_translation_m),
           fmt::format("{:.4f}", metrics.rpe_rotation_deg)};
+}
+
+std::string warn_of_gaps(const MetricsReport& report) {
+  return report.tracked_fraction >= kMostTracked
+             ? ""
+             : fmt::format(
+                   "tracked: {:.1f} % of the frames only have a measured pose; the others' are a "
+                   "guess (state in frames.csv)",
+                   100.0 * report.tracked_fraction);
 }
 
 std::string warn_of_road(const MetricsReport& report) {

@@ -70,6 +70,8 @@ struct MetricsReport {
 
 /// The warning about a road that was believed never or on few frames; empty where all is well.
 [[nodiscard]] std::string warn_of_road(const MetricsReport& report);
+/// The same where most of the path is no measurement.
+[[nodiscard]] std::string warn_of_gaps(const MetricsReport& report);
 
 /// The document that metrics.json holds; `alignment` is that of the offset, t_rel, r_rel, the RPE.
 [[nodiscard]] nlohmann::ordered_json metrics_document(const MetricsReport& report);

@@ -141,6 +141,13 @@ TEST(MetricsTable, SaysWhereARoadWasBelievedNeverOrSeldom) {
   EXPECT_EQ(warn_of_road(report), "");
 }
 
+TEST(MetricsTable, SaysThatMostOfThePathIsNoMeasurement) {
+  MetricsReport report = example();
+  EXPECT_EQ(warn_of_gaps(report), "");
+  report.tracked_fraction = 0.358;
+  EXPECT_THAT(warn_of_gaps(report), HasSubstr("35.8 % of the frames only"));
+}
+
 TEST(MetricsTable, NamesTheAlignmentAndTheNullRow) {
   const std::string table = format_metrics_table(example());
   EXPECT_THAT(table, ContainsRegex("t_rel +0\\.97  % +none"));
