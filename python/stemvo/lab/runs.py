@@ -50,8 +50,9 @@ def published():
 
 
 def options_of(config=None, overrides=(), model=None):
-    """Keys and values of a configuration file (`paper`: the program's own), of KEY=VALUE lines and of a model's file."""
-    values = {}
+    """Keys and values of a configuration file (`paper`: the program's own), of KEY=VALUE lines and of a model's file. The file's sampling
+    is its own model's: another model keeps it where it can."""
+    values, given = {}, {}
     if config:
         file = config_file(config)
         stemvo.Options.load(file)  # whose message names file and line
@@ -61,8 +62,13 @@ def options_of(config=None, overrides=(), model=None):
         key, found, value = line.partition("=")
         if not found:
             raise ValueError(f"--set: expected KEY=VALUE, found '{line}'")
-        values[key] = value
-    return values | ({"stem.model": str(model)} if model else {})
+        given[key] = value
+    given |= {"stem.model": str(model)} if model else {}
+    if "stem.model" in given and (sampling := values.get("stem.sampling_px")):
+        stride, is_native = stemvo._core.model_stride(given["stem.model"])
+        if stride % sampling or (is_native and sampling != stride):
+            del values["stem.sampling_px"]
+    return values | given
 
 
 @dataclasses.dataclass(frozen=True)

@@ -62,10 +62,13 @@ def layer_of(model, values, is_baseline=False, **more):
                  hashlib.sha256((program_hash() + str(settings)).encode()).hexdigest()[:16], is_baseline)
 
 
-def layers_of(models, values, baselines):
-    layers = [layer_of(str(pathlib.Path(model).resolve()) if model.endswith(".onnx") else model, values) for model in models]
-    if baselines:
-        layers += [layer_of("gray", values, True, **{"features.method": "orb"}), layer_of("input_layer", values, True)]
+def layers_of(models, config, overrides, baselines):
+    def layer(model, is_baseline=False, **more):
+        values = ({} if config else DEFAULTS) | options_of(config, overrides, model) | {"scale.source": "ground_truth"}
+        return layer_of(model, values | ({"stem.sampling_px": 0} if is_baseline else {}), is_baseline, **more)
+
+    layers = [layer(str(pathlib.Path(model).resolve()) if model.endswith(".onnx") else model) for model in models]
+    layers += [layer("gray", True, **{"features.method": "orb"}), layer("input_layer", True)] if baselines else []
     if twice := [name for name, count in collections.Counter((one.name, one.features) for one in layers).items() if count > 1]:
         raise ValueError(f"--model: expected each name once, found '{twice[0][0]}' again")
     return layers
@@ -234,8 +237,7 @@ def command(drives, models, out, frames, held_out, held_out_frames, kinds, filte
     and adds drives, models or filters. After a quarter, half and three quarters of the frames, filters that are worse than the best at 95 %
     by a paired moving-block bootstrap are stopped.
     """
-    values = options_of(config, overrides) if config else DEFAULTS | options_of(None, overrides)
-    layers = layers_of(models, values | {"scale.source": "ground_truth"}, baselines)
+    layers = layers_of(models, config, overrides, baselines)
     seen = [score.Drive(str(pathlib.Path(drive).resolve()), frames, kind or None) for kind in ["", *filter(None, kinds.split(","))] for drive in drives]
     seen += [score.Drive(str(pathlib.Path(drive).resolve()), held_out_frames, held_out=True) for drive in held_out]
     if twice := [name for name, count in collections.Counter((drive.name, drive.held_out) for drive in seen).items() if count > 1]:
