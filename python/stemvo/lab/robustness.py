@@ -15,8 +15,7 @@ from stemvo.lab import bootstrap, score, work
 from stemvo.lab.disturbances import ALL, Disturbed, find
 from stemvo.lab.ranking import number
 from stemvo.lab.rows import Rows
-from stemvo.lab.runs import open_folder, options_of
-from stemvo.lab.search import program_hash
+from stemvo.lab.runs import open_folder, options_of, program_hash
 
 CONTROLS = ("gray", "red", "green", "blue", "log", "census", "orb", "sift")
 COLORS = {"red": 0, "green": 1, "blue": 2}
@@ -202,7 +201,7 @@ def kinds_help():
 @click.option("--controls", default="", help=f"Only these: {', '.join(CONTROLS)}, or other filters, MODEL:K")
 @click.option("--config", help="Configuration of the judged channel.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="A key of the configuration.")
-@click.option("--jobs", type=int, help="Processes; default: one per core.")
+@click.option("--jobs", type=click.IntRange(1), help="Processes; default: one per core.")
 @click.option("--address", help="Of a Ray cluster; else this machine alone.")
 @click.option("--ray/--no-ray", default=True, help="Processes of our own in place of Ray.")
 def command(drives, out, frames, kinds, controls, config, overrides, jobs, address, ray):

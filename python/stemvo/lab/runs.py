@@ -44,6 +44,11 @@ def config_file(name):
     return next((file for file in ours if file.exists()), pathlib.Path(name))
 
 
+def image_sizes(folder):
+    """Names and sizes of a KITTI sequence's images, which tell others without being read."""
+    return "".join(f"{file.relative_to(folder)} {file.stat().st_size}\n" for file in sorted(folder.glob("image_*/*"))).encode()
+
+
 def published():
     """Official sequences and published numbers."""
     return json.loads(pathlib.Path(__file__).with_name("published.json").read_text())
@@ -127,9 +132,7 @@ class Sequence:
     @functools.cached_property
     def identity(self):
         """Hash of the images' names and sizes, calibration, times and true poses."""
-        hashed = hashlib.sha256(f"{len(self)}".encode())
-        for file in sorted(self.path.glob("image_*/*")):
-            hashed.update(f"{file.relative_to(self.path)} {file.stat().st_size}\n".encode())
+        hashed = hashlib.sha256(f"{len(self)}".encode() + image_sizes(self.path))
         for file in (self.path / "calib.txt", self.path / "times.txt", self.path.parent.parent / "poses" / f"{self.name}.txt"):
             hashed.update(file.read_bytes() if file.exists() else b"none")
         return hashed.hexdigest()
@@ -147,13 +150,17 @@ def sequences_of(kitti, names=(), frames=None):
 
 
 @functools.cache
-def program_identity():
-    return hashlib.sha256(pathlib.Path(stemvo._core.__file__).read_bytes()).hexdigest()
+def program_hash():
+    """A build without a clean commit has a version that does not change with its code."""
+    version = stemvo.__version__
+    if "+" in version and not version.endswith(".dirty"):
+        return version
+    return version + hashlib.sha256(pathlib.Path(stemvo._core.__file__).read_bytes()).hexdigest()
 
 
 def _identity(method, sequence):
     """Hash of everything that poses and errors depend on."""
-    hashed = hashlib.sha256(f"{program_identity()} {sequence.identity} {method.scale}".encode())
+    hashed = hashlib.sha256(f"{program_hash()} {sequence.identity} {method.scale}".encode())
     if method.folder is not None:
         hashed.update(trajectory_file(method, sequence).read_bytes())
         return hashed.hexdigest()

@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import os
 import pathlib
+import re
 import time
 
 import click
@@ -15,7 +16,7 @@ import stemvo
 from stemvo import _core
 from stemvo.lab import ranking, score, work
 from stemvo.lab.rows import Rows
-from stemvo.lab.runs import open_folder, options_of
+from stemvo.lab.runs import open_folder, options_of, program_hash
 
 # A run's odometry made cheap: pairs of frames, fewer points, steps of the true length.
 DEFAULTS = {"odometry.mode": "two_frame", "scale.source": "ground_truth", "features.max_features": 400, "features.klt_window": 23,
@@ -42,14 +43,6 @@ class Layer:
         return score.Block(self.model, filters, drive, self.options)
 
 
-def program_hash():
-    """A build without a clean commit has a version that does not change with its code."""
-    version = stemvo.__version__
-    if "+" in version and not version.endswith(".dirty"):
-        return version
-    return version + hashlib.sha256(pathlib.Path(_core.__file__).read_bytes()).hexdigest()
-
-
 def layer_of(model, values, is_baseline=False, **more):
     stride, is_native = _core.model_stride(model)
     if stride > 2 and stride % 2 == 0 and not is_native and not values.get("stem.sampling_px"):
@@ -72,6 +65,15 @@ def layers_of(models, config, overrides, baselines):
     if twice := [name for name, count in collections.Counter((one.name, one.features) for one in layers).items() if count > 1]:
         raise ValueError(f"--model: expected each name once, found '{twice[0][0]}' again")
     return layers
+
+
+def filters_of(layer, text):
+    """A:B, A: or :B."""
+    ends = re.fullmatch(r"(\d*):(\d*)", text)
+    first, last = (int(ends[1] or 0), int(ends[2] or layer.num_filters)) if ends else (0, 0)
+    if not first < last <= layer.num_filters:
+        raise ValueError(f"--filters: expected A:B inside 0:{layer.num_filters} for {layer.name}, found '{text}'")
+    return range(first, last)
 
 
 def part_of(candidates, shard):
@@ -225,8 +227,8 @@ def write_results(out, table):
 @click.option("--config", help="Configuration in place of the search's own cheap one.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="A key of the configuration.")
 @click.option("--rows", "others", multiple=True, type=click.Path(exists=True, dir_okay=False), help="rows.csv of another search: its rows count too.")
-@click.option("--plan", "planned", type=int, help="Only say what so many filters would take.")
-@click.option("--jobs", type=int, help="Processes; default: one per core.")
+@click.option("--plan", "planned", type=click.IntRange(1), help="Only say what so many filters would take.")
+@click.option("--jobs", type=click.IntRange(1), help="Processes; default: one per core.")
 @click.option("--address", help="Of a Ray cluster; else this machine alone.")
 @click.option("--ray/--no-ray", default=True, help="Processes of our own in place of Ray.")
 def command(drives, models, out, frames, held_out, held_out_frames, kinds, filters, shard, exhaustive, baselines, config, overrides, others, planned, jobs,
@@ -245,8 +247,7 @@ def command(drives, models, out, frames, held_out, held_out_frames, kinds, filte
     jobs = jobs or (None if address else len(os.sched_getaffinity(0)))
     if planned:
         return click.echo(plan(planned, layers, seen, jobs or 1))
-    first, _, last = (filters or ":").partition(":")
-    candidates = [(layer, k) for layer in layers if not layer.is_baseline for k in range(layer.num_filters)[int(first or 0) : int(last) if last else None]]
+    candidates = [(layer, k) for layer in layers if not layer.is_baseline for k in filters_of(layer, filters or ":")]
     candidates = part_of(candidates, shard) if shard else candidates
     candidates += [(layer, k) for layer in layers if layer.is_baseline for k in range(layer.num_filters)]
     open_folder(out, "search", [*(f"{drive}/times.txt" for drive in (*drives, *held_out)), *models, *others, config])
