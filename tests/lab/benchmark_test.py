@@ -118,7 +118,7 @@ def test_a_configurations_sampling_is_its_models():
     assert "stem.sampling_px" not in runs.options_of("paper", (), "default")
     assert runs.options_of("paper")["stem.sampling_px"] == runs.options_of("paper", (), "paper")["stem.sampling_px"] == 4
     layers = search.layers_of(["default", "paper"], "paper", (), True)
-    assert [dict(layer.options).get("stem.sampling_px") for layer in layers] == [None, 4, 0, 0]
+    assert [dict(layer.options).get("stem.sampling_px") for layer in layers] == [None, 4, None, None]
     with pytest.raises(ValueError, match="stride 2 or a divisor of it, found 4"):
         search.layers_of(["default"], "paper", ["stem.sampling_px=4"], True)
 

@@ -44,9 +44,8 @@ def load(given, name, truth_file, align, camera_file, tolerance_s, first):
     file = trajectory_in(given)
     true_poses, true_times = stemvo.read_trajectory(truth_file, camera_file)
     poses, times = stemvo.read_trajectory(file)
-    for read, one in ((true_poses, truth_file), (poses, file)):
-        if len(read) < 2:
-            raise ValueError(f"{one}: expected 2 poses or more, found {len(read)}")
+    if len(poses) < 2:
+        raise ValueError(f"{file}: expected 2 poses or more, found {len(poses)}")
     if true_times is not None and times is not None:
         which, frames = stemvo.pair_by_time(times, true_times, tolerance_s)
     elif first is None and len(poses) != len(true_poses):
@@ -117,10 +116,9 @@ def compare(paths, truth_file, camera_file, align):
     true_poses = stemvo.read_trajectory(truth_file, camera_file)[0]
     aligned, truth = common(paths, true_poses, align)
     along = distance_along(truth)
-    still = np.tile(np.eye(4), (len(truth), 1, 1))
+    still = stemvo.evaluate(np.tile(np.eye(4), (len(truth), 1, 1)), truth)
     rows = [{"path": path.name} | {title: path.metrics[key] for key, title in METRICS.items()} for path in paths]
-    rows.append({"path": "zero motion", "poses": len(truth), "ATE, m": stemvo.evaluate(still, truth)["ate_rmse_m"]["none"],
-                 "offset, m": stemvo.evaluate(still, truth)["average_offset_m"]})
+    rows.append({"path": "zero motion", "poses": len(truth), "ATE, m": still["ate_rmse_m"]["none"], "offset, m": still["average_offset_m"]})
     segments = by_segment(aligned, truth)
     lines = {"position error over distance": ({name: (along, np.linalg.norm(poses[:, :3, 3] - truth[:, :3, 3], axis=1))
                                                for name, poses in aligned.items()}, "distance, m", "position error, m")}

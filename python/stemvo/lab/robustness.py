@@ -8,6 +8,7 @@ import pathlib
 
 import click
 import numpy as np
+import tqdm
 from scipy.spatial.transform import Rotation
 
 import stemvo
@@ -231,12 +232,10 @@ def command(drives, out, frames, kinds, controls, config, overrides, jobs, addre
             for name, options in channels.items():
                 of = hashlib.sha256(f"{program} {sorted(options.items())} {has_true_steps}".encode()).hexdigest()[:16]
                 tasks[kind, strength, drive, name] = Task(name, tuple(options.items()), has_true_steps, drive, kind, strength), (of, drive.name, hashes[drive], kind, strength)
-    from tqdm import tqdm
-
     missing = {task: key for task, key in tasks.values() if rows.get(key) is None}
     if missing:
         with work.workers(jobs, address, ray) as workers:
-            for task, row in tqdm(work.run(workers, outcome, missing), total=len(missing), unit=" runs", disable=None):
+            for task, row in tqdm.tqdm(work.run(workers, outcome, missing), total=len(missing), unit=" runs", disable=None):
                 rows.append([dict(zip(KEY, missing[task])) | row | {"channel": task.channel}])
                 if row["refused"]:
                     click.echo(f"{task.drive.name}, {task.disturbance} {task.strength}, {task.channel}: {row['refused']}", err=True)

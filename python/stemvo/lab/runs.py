@@ -205,12 +205,6 @@ def others_poses(method, sequence):
     return poses[:len(sequence)]
 
 
-def measure(poses, truth, align="none"):
-    """evaluate()'s numbers; ATE always after Sim(3)."""
-    found = stemvo.evaluate(poses, truth, align)
-    return {name: found[name] for name in METRICS} | {"ate_rmse_m": found["ate_rmse_m"]["sim3"]}
-
-
 def run(method, sequence, folder, progress=None):
     """A row (its state is done, failed or not possible) and Nx4x4 or None. Kept in `folder`: not computed again while program,
     options, model, frames, calibration and ground truth are the same."""
@@ -247,5 +241,6 @@ def _compute(method, sequence, row, progress):
     if in_units and method.scale == ROAD:
         row["problem"] = "no road was believed: the path is in units"
     if sequence.truth is not None:
-        row |= measure(poses[sequence.recording.ground_truth_frames], sequence.truth, row["alignment"])
+        found = stemvo.evaluate(poses[sequence.recording.ground_truth_frames], sequence.truth, row["alignment"])
+        row |= {name: found[name] for name in METRICS} | {"ate_rmse_m": found["ate_rmse_m"]["sim3"]}  # always after Sim(3)
     return row, poses

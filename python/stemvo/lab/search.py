@@ -11,6 +11,7 @@ import time
 
 import click
 import numpy as np
+import tqdm
 
 import stemvo
 from stemvo import _core
@@ -43,11 +44,13 @@ class Layer:
         return score.Block(self.model, filters, drive, self.options)
 
 
-def layer_of(model, values, is_baseline=False, **more):
+def layer_of(model, config, overrides, is_baseline=False, **more):
+    values = ({} if config else DEFAULTS) | options_of(config, overrides, model) | {"scale.source": "ground_truth"}
+    dropped = ("stem.model", "stem.filter", *["stem.sampling_px"] * is_baseline)
     stride, is_native = _core.model_stride(model)
     if stride > 2 and stride % 2 == 0 and not is_native and not values.get("stem.sampling_px"):
         more["stem.sampling_px"] = stride // 2  # shifted passes of a coarse layer cost more than more of them tell
-    values = {key: value for key, value in values.items() if key not in ("stem.model", "stem.filter")} | more
+    values = {key: value for key, value in values.items() if key not in dropped} | more
     settings = stemvo.Options(values | {"threads": 1})
     stem = _core.Stem(stemvo.Options(values | {"stem.model": model}))
     return Layer(model, pathlib.Path(model).stem if model.endswith(".onnx") else model, hashlib.sha256(_core.model_bytes(model)).hexdigest()[:16], stem.layer or "input",
@@ -56,12 +59,9 @@ def layer_of(model, values, is_baseline=False, **more):
 
 
 def layers_of(models, config, overrides, baselines):
-    def layer(model, is_baseline=False, **more):
-        values = ({} if config else DEFAULTS) | options_of(config, overrides, model) | {"scale.source": "ground_truth"}
-        return layer_of(model, values | ({"stem.sampling_px": 0} if is_baseline else {}), is_baseline, **more)
-
-    layers = [layer(str(pathlib.Path(model).resolve()) if model.endswith(".onnx") else model) for model in models]
-    layers += [layer("gray", True, **{"features.method": "orb"}), layer("input_layer", True)] if baselines else []
+    layers = [layer_of(str(pathlib.Path(model).resolve()) if model.endswith(".onnx") else model, config, overrides) for model in models]
+    if baselines:
+        layers += [layer_of("gray", config, overrides, True, **{"features.method": "orb"}), layer_of("input_layer", config, overrides, True)]
     if twice := [name for name, count in collections.Counter((one.name, one.features) for one in layers).items() if count > 1]:
         raise ValueError(f"--model: expected each name once, found '{twice[0][0]}' again")
     return layers
@@ -88,9 +88,8 @@ def part_of(candidates, shard):
 class Search:
     """Candidates are (layer, filter). Rows that are there are not computed again."""
 
-    def __init__(self, drives, rows, candidates, workers, progress=None):
-        self.drives, self.rows, self.candidates, self.workers = drives, rows, candidates, workers
-        self.progress = progress or (lambda frames: None)
+    def __init__(self, drives, rows, candidates, workers, progress):
+        self.drives, self.rows, self.candidates, self.workers, self.progress = drives, rows, candidates, workers, progress
         self._hashes = {drive: drive.hash() for drive in drives}
         self._lengths = {drive: len(drive.open()) for drive in drives}
         self._kept, self._blocks = {}, {}
@@ -244,18 +243,15 @@ def command(drives, models, out, frames, held_out, held_out_frames, kinds, filte
     seen += [score.Drive(str(pathlib.Path(drive).resolve()), held_out_frames, held_out=True) for drive in held_out]
     if twice := [name for name, count in collections.Counter((drive.name, drive.held_out) for drive in seen).items() if count > 1]:
         raise ValueError(f"DRIVE: expected each name once, found {twice[0][0]} twice")
-    jobs = jobs or (None if address else len(os.sched_getaffinity(0)))
     if planned:
-        return click.echo(plan(planned, layers, seen, jobs or 1))
+        return click.echo(plan(planned, layers, seen, jobs or len(os.sched_getaffinity(0))))
     candidates = [(layer, k) for layer in layers if not layer.is_baseline for k in filters_of(layer, filters or ":")]
     candidates = part_of(candidates, shard) if shard else candidates
     candidates += [(layer, k) for layer in layers if layer.is_baseline for k in range(layer.num_filters)]
     open_folder(out, "search", [*(f"{drive}/times.txt" for drive in (*drives, *held_out)), *models, *others, config])
     rows = Rows(out / "rows.csv", COLUMNS, len(KEY), others)
     shares = SHARES[-1:] if exhaustive else SHARES
-    from tqdm import tqdm
-
-    with work.workers(jobs, address, ray) as workers, tqdm(unit=" filter-frames", disable=None) as bar:
+    with work.workers(jobs, address, ray) as workers, tqdm.tqdm(unit=" filter-frames", disable=None) as bar:
         search = Search(seen, rows, candidates, workers, bar.update)
         search.race(shares)
     table = search.table(shares)
