@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 from small_kitti import write_sequence
-from stemvo.lab import benchmark, runs
+from stemvo.lab import benchmark, runs, search
 from stemvo.lab.cli import main
 
 GRAY = ("--set", "stem.model=gray", "--config", "default")
@@ -112,6 +112,15 @@ def test_wrong_requests_are_errors(kitti, tmp_path):
                              (("--config", "default", "--config", "default"), "expected methods of different names")):
         assert words in call(kitti, tmp_path / "none", *arguments, code=1)
     assert "expected a folder per sequence" in call(tmp_path, tmp_path / "none", code=1)
+
+
+def test_a_configurations_sampling_is_its_models():
+    assert "stem.sampling_px" not in runs.options_of("paper", (), "default")
+    assert runs.options_of("paper")["stem.sampling_px"] == runs.options_of("paper", (), "paper")["stem.sampling_px"] == 4
+    layers = search.layers_of(["default", "paper"], "paper", (), True)
+    assert [dict(layer.options).get("stem.sampling_px") for layer in layers] == [None, 4, None, None]
+    with pytest.raises(ValueError, match="stride 2 or a divisor of it, found 4"):
+        search.layers_of(["default"], "paper", ["stem.sampling_px=4"], True)
 
 
 def test_each_published_row_has_a_number_its_alignment_and_its_source():

@@ -76,6 +76,10 @@ def test_names_formats_and_what_belongs_together(tmp_path):
     truth_file, good = write_kitti(tmp_path / "truth.txt", truth), write_kitti(tmp_path / "good.txt", path_of(0.001)[40:])
     whole = write_kitti(tmp_path / "whole.txt", path_of(0.002, seed=2))
     assert "--first says which" in call(tmp_path / "out", write_kitti(tmp_path / "long.txt", np.concatenate([truth, truth])), "--gt", truth_file, code=1)
+    one = write_kitti(tmp_path / "one.txt", truth[:1])
+    for given, words in (([whole, good], "expected 400 poses, one per line of"), ([good, "--first", 41], "from which 360 follow"),
+                         ([good, whole, "--first", 40], "from which 400 follow"), ([one], "expected 2 poses or more, found 1")):
+        assert words in call(tmp_path / "out", *given, "--gt", truth_file, code=1)
     assert "expected 2 different names" in call(tmp_path / "out", good, whole, "--gt", truth_file, "--names", "a,a", code=1)
     call(tmp_path / "out", good, "--gt", truth_file, "--first", 40, "--align", "sim3")
     rows = pd.read_csv(tmp_path / "out/numbers.csv")
@@ -92,6 +96,9 @@ def test_worse_is_told_and_equal_is_not(tmp_path):
     call(tmp_path / "out", *files, "--gt", truth)
     rows = pd.read_csv(tmp_path / "out/differences.csv").set_index("pair")
     assert rows["smaller t_rel"].to_dict() == {"good - alike": "not told apart", "good - bad": "good", "alike - bad": "alike"}
+    short = [write_kitti(tmp_path / f"short_{file.name}", np.loadtxt(file).reshape(-1, 3, 4)[:3]) for file in files]
+    assert "inf" not in call(tmp_path / "out", *short, "--gt", truth, "--first", 0)
+    assert set(pd.read_csv(tmp_path / "out/differences.csv")["t_rel, %"]) == {"too few shared frames"}
 
 
 def test_intervals_hold_the_truth():

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 from exporting import save_network
 from small_kitti import write_sequence
-from stemvo.lab import paper
+from stemvo.lab import paper, runs
 from stemvo.lab.cli import main
 
 MODEL = pathlib.Path(__file__).parents[2] / "models/default.onnx"
@@ -27,7 +27,8 @@ def made(tmp_path_factory):
     write_sequence(folder / "kitti", "06", camera="image_2")
     (folder / "theirs").mkdir()
     (folder / "theirs/06.txt").write_text("".join(f"1 0 0 {0.1 * i} 0 1 0 0 0 0 1 {0.5 * i}\n" for i in range(8)))
-    answer = CliRunner().invoke(main, ["paper", str(MODEL), str(folder / "kitti"), "--out", str(folder / "out"), "--filters", "0:2", "--tartanvo", str(folder / "theirs")])
+    model = shutil.copy(MODEL, folder / "mobilenetv1_025_128or224_tfhub_imagenet.onnx")  # a long name
+    answer = CliRunner().invoke(main, ["paper", str(model), str(folder / "kitti"), "--out", str(folder / "out"), "--filters", "0:2", "--tartanvo", str(folder / "theirs")])
     assert answer.exit_code == 0, answer.output
     return folder / "out"
 
@@ -40,13 +41,13 @@ def test_latex_compiles(made):
     if not shutil.which("pdflatex"):
         pytest.skip("pdflatex is missing (tools/setup.sh tex)")
     subprocess.run(["pdflatex", "-interaction=batchmode", "-halt-on-error", "paper.tex"], cwd=made, check=True, stdout=subprocess.DEVNULL)
-    assert (made / "paper.pdf").stat().st_size > 10000
+    assert (made / "paper.pdf").stat().st_size > 10000 and "Overfull" not in (made / "paper.log").read_text()
 
 
 def test_layers_are_counted_beside_the_papers(made):
     rows = pd.read_csv(made / "table1.csv").set_index("Model")
     assert rows.loc["ConvNeXtXLarge (the paper)"].tolist() == [297, 332806, 36096, 296710]
-    assert rows.iloc[3].tolist() == [1, 16, 16, 0] and rows.index[3] == "default (stand-in)"
+    assert rows.iloc[3].tolist() == [1, 16, 16, 0] and rows.index[3] == "mobilenetv1_025_128or224_tfhub_imagenet (stand-in)"
 
 
 def test_a_gray_input_is_one_row_and_each_number_says_what_it_ran_on(made):
@@ -71,6 +72,13 @@ def test_figures(made):
     for name in ("figure1", "figure3", "figure5"):
         assert (made / f"{name}.svg").stat().st_size > 1000
     assert not (made / "figure4.svg").exists()
+
+
+def test_each_layer_is_drawn_beyond_z(tmp_path):
+    write_sequence(tmp_path, "00")
+    paper.figure_1([paper.Layer("network", f"layer {i}", 1, "gray") for i in range(27)], runs.Sequence(tmp_path, "00"), 0, tmp_path)
+    svg = (tmp_path / "figure1.svg").read_text()
+    assert "(z) network, layer 24" in svg and "(aa) network, layer 25" in svg and "(bb) network, layer 26" in svg
 
 
 def test_all_layers_of_a_network(tmp_path):

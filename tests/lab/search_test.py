@@ -12,7 +12,8 @@ import time
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from stemvo.lab import bootstrap, ranking
+from small_kitti import write_sequence
+from stemvo.lab import bootstrap, ranking, score
 from stemvo.lab.cli import main
 from stemvo.lab.rows import Rows
 
@@ -77,10 +78,25 @@ def test_a_drive_too_short_for_a_segment_is_said(drive, tmp_path):
     assert "None" not in done.output
 
 
-@pytest.mark.parametrize(("more", "message"), [(["--shard", "2/2"], "--shard: expected I/N"), (["--model", "default"], "'default' again"), (["--set", "features.nothing=3"], "features.nothing")])
+@pytest.mark.parametrize(("more", "message"), [
+    (["--shard", "2/2"], "--shard: expected I/N"), (["--model", "default"], "'default' again"), (["--set", "features.nothing=3"], "features.nothing"),
+    (["--filters", "abc"], "--filters: expected A:B inside 0:3 for input_layer, found 'abc'"), (["--filters", "2:4"], "found '2:4'"), (["--frames", "0:1"], "--frames: expected 2 frames or more")])
 def test_bad_input_is_one_line(drive, tmp_path, more, message):
     done = CliRunner().invoke(main, arguments(drive, tmp_path, *more))
     assert done.exit_code == 1 and message in done.output and len(done.output.splitlines()) == 1, done.output
+
+
+@pytest.mark.parametrize("option", [("--jobs", 0), ("--jobs", -1), ("--plan", -5)])
+def test_counts_are_above_zero(drive, tmp_path, option):
+    done = CliRunner().invoke(main, arguments(drive, tmp_path, *option))
+    assert done.exit_code == 2 and f"Invalid value for '{option[0]}'" in done.output
+
+
+def test_other_images_are_another_drive(tmp_path):
+    folder = write_sequence(tmp_path, "00")
+    before = score.Drive(str(folder)).hash()
+    (folder / "image_0/000003.png").write_bytes((folder / "image_0/000002.png").read_bytes())
+    assert score.Drive(str(folder)).hash() != before
 
 
 def test_plan(drive, tmp_path):

@@ -44,13 +44,17 @@ def load(given, name, truth_file, align, camera_file, tolerance_s, first):
     file = trajectory_in(given)
     true_poses, true_times = stemvo.read_trajectory(truth_file, camera_file)
     poses, times = stemvo.read_trajectory(file)
+    if len(poses) < 2:
+        raise ValueError(f"{file}: expected 2 poses or more, found {len(poses)}")
     if true_times is not None and times is not None:
         which, frames = stemvo.pair_by_time(times, true_times, tolerance_s)
-    elif first <= len(true_poses) - len(poses) or len(poses) == len(true_poses):
-        which, frames = np.arange(len(poses)), np.arange(len(poses)) + first
+    elif first is None and len(poses) != len(true_poses):
+        raise ValueError(f"{file}: expected {len(true_poses)} poses, one per line of {truth_file}, found {len(poses)}; "
+                         "where times are missing --first says which true pose goes with the first")
+    elif (first or 0) + len(poses) > len(true_poses):
+        raise ValueError(f"--first: expected a line of {truth_file} ({len(true_poses)} poses) from which {len(poses)} follow, those of {file}, found {first}")
     else:
-        raise ValueError(f"{file}: expected {len(true_poses) - first} poses, one per line of {truth_file}, found {len(poses)}; "
-                            "where times are missing --first says which true pose goes with the first")
+        which, frames = np.arange(len(poses)), np.arange(len(poses)) + (first or 0)
     if len(frames) < 2:
         raise ValueError(f"{file}: expected times of {truth_file}, found {len(frames)} within {tolerance_s} s")
     poses, truth = poses[which], true_poses[frames]
@@ -100,7 +104,8 @@ def differences(aligned, truth):
         row = {"pair": f"{first} - {second}"}
         for key, title, decimals in (("t_percent", "t_rel, %", 2), ("r_deg_per_100m", "r_rel, deg/100 m", 3)):
             found = bootstrap.difference([bootstrap.Drive(mine[key], theirs[key], block)])
-            row[title] = f"{found.middle:+.{decimals}f} [{found.low:+.{decimals}f}, {found.high:+.{decimals}f}]"
+            is_bounded = np.isfinite(found.low)
+            row[title] = f"{found.middle:+.{decimals}f} [{found.low:+.{decimals}f}, {found.high:+.{decimals}f}]" if is_bounded else "too few shared frames"
             row[f"smaller {title.split(',')[0]}"] = (first if found.middle < 0.0 else second) if found.is_told else "not told apart"
         rows.append(row)
     return pd.DataFrame(rows)
@@ -111,10 +116,9 @@ def compare(paths, truth_file, camera_file, align):
     true_poses = stemvo.read_trajectory(truth_file, camera_file)[0]
     aligned, truth = common(paths, true_poses, align)
     along = distance_along(truth)
-    still = np.tile(np.eye(4), (len(truth), 1, 1))
+    still = stemvo.evaluate(np.tile(np.eye(4), (len(truth), 1, 1)), truth)
     rows = [{"path": path.name} | {title: path.metrics[key] for key, title in METRICS.items()} for path in paths]
-    rows.append({"path": "zero motion", "poses": len(truth), "ATE, m": stemvo.evaluate(still, truth)["ate_rmse_m"]["none"],
-                 "offset, m": stemvo.evaluate(still, truth)["average_offset_m"]})
+    rows.append({"path": "zero motion", "poses": len(truth), "ATE, m": still["ate_rmse_m"]["none"], "offset, m": still["average_offset_m"]})
     segments = by_segment(aligned, truth)
     lines = {"position error over distance": ({name: (along, np.linalg.norm(poses[:, :3, 3] - truth[:, :3, 3], axis=1))
                                                for name, poses in aligned.items()}, "distance, m", "position error, m")}
@@ -175,7 +179,7 @@ def write_report(out, title, found, lines, positions, note, width):
 @click.option("--names", help="Joined by commas, in the order of A B ..")
 @click.option("--camera", type=click.Path(exists=True, path_type=pathlib.Path), help="With EuRoC's truth: whose T_BS counts")
 @click.option("--tolerance", default=0.01, show_default=True, help="Seconds between a pose and its true one")
-@click.option("--first", default=0, help="Line of the truth (from 0) that files without times begin at")
+@click.option("--first", type=click.IntRange(0), help="Line of the truth (from 0) that files without times begin at")
 @click.option("--width", type=click.Choice(list(figures.WIDTHS_IN)), default="column", show_default=True, help="Of the figures: of a paper's")
 def command(given, gt, out, align, names, camera, tolerance, first, width):
     """Results of `stemvo run`, or trajectory files of any program (KITTI, TUM, EuRoC), compared."""

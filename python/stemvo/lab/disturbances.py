@@ -79,23 +79,19 @@ def _pixels(image, of_1242):
     return of_1242 * image.shape[1] / 1242.0
 
 
-def _levels(values):
+def levels(values):
     return np.clip(np.rint(values), 0, 255).astype(np.uint8)
 
 
 def _map_levels(image, function):
-    return cv2.LUT(image, _levels(function(np.arange(256.0))))
+    return cv2.LUT(image, levels(function(np.arange(256.0))))
 
 
 def _blend(image, weight, gray):
     """weight * image + (1 - weight) * gray."""
     weight = np.asarray(weight, np.float32)
     weight = weight if image.ndim == 2 else weight[..., None]
-    return _levels((image.astype(np.float32) - np.float32(gray)) * weight + np.float32(gray))
-
-
-def _grid(image):
-    return np.arange(image.shape[0])[:, None], np.arange(image.shape[1])[None, :]
+    return levels((image.astype(np.float32) - np.float32(gray)) * weight + np.float32(gray))
 
 
 def _texture(width, height, like, seed):
@@ -107,7 +103,7 @@ def _texture(width, height, like, seed):
 
 def _vignette(image, strength, at):
     height, width = image.shape[:2]
-    v, u = _grid(image)
+    v, u = np.ogrid[: image.shape[0], : image.shape[1]]
     return _blend(image, 1.0 - strength * ((u - 0.5 * width) ** 2 + (v - 0.5 * height) ** 2) / ((0.5 * at.camera.width) ** 2 + (0.5 * at.camera.height) ** 2), 0.0)
 
 
@@ -115,7 +111,7 @@ def _dusk(image, strength, at):
     """A sensor of 4000 electrons at white and 3 electrons of read noise; photon noise is normal with Poisson's variance."""
     light = strength ** min(1.0, at.frame / 50.0)
     electrons = image * (light * 4000.0 / 255.0)
-    return _levels((electrons + np.sqrt(electrons + 9.0) * at.random.standard_normal(image.shape)) * 255.0 / (4000.0 * math.sqrt(light)))
+    return levels((electrons + np.sqrt(electrons + 9.0) * at.random.standard_normal(image.shape)) * 255.0 / (4000.0 * math.sqrt(light)))
 
 
 def _motion_blur(image, strength, at):
@@ -151,7 +147,7 @@ def _rain(image, strength, at):
 
 
 def _shadows(image, strength, at):
-    v, u = _grid(image)
+    v, u = np.ogrid[: image.shape[0], : image.shape[1]]
     is_shaded = np.fmod(u + 0.5 * v + _pixels(image, 9.0) * at.frame, _pixels(image, 280.0)) < _pixels(image, 140.0)
     weight = np.where(is_shaded, np.float32(1.0 - strength), np.float32(1.0))
     return _blend(image, cv2.GaussianBlur(weight, (0, 0), _pixels(image, 2.0)), 0.0)
@@ -226,7 +222,7 @@ ALL = (
     Disturbance("low_contrast", "light", "this share of the contrast is left", (0.5, 0.25, 0.1),
                 lambda image, share, at: _map_levels(image, lambda level: 128.0 + share * (level - 128.0))),
     Disturbance("sensor_noise", "noise", "normal noise of this many gray levels", (6.0, 12.0, 24.0),
-                lambda image, sigma, at: _levels(image + sigma * at.random.standard_normal(image.shape))),
+                lambda image, sigma, at: levels(image + sigma * at.random.standard_normal(image.shape))),
     Disturbance("gaussian_blur", "blur", "of this sigma, pixels of a frame 1242 wide", (1.0, 2.0, 3.0),
                 lambda image, sigma, at: cv2.GaussianBlur(image, (0, 0), _pixels(image, sigma))),
     Disturbance("motion_blur", "blur", "along a line so long, of another direction in each frame", (5.0, 11.0, 21.0), _motion_blur),

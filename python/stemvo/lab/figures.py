@@ -17,15 +17,12 @@ plt.rcParams.update({"font.family": "serif", "font.serif": ["STIXGeneral"], "mat
                      "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False})
 
 
-def look(index):
-    """Colour, and dashes of both libraries: lines are told apart where there are more than colours."""
-    return COLORS[index % len(COLORS)], *DASHES[index // len(COLORS) % len(DASHES)]
-
-
 def looks(names):
-    """By name, in their order; the ground truth is gray and takes none."""
+    """By name, in their order: colour, and dashes of both libraries, which tell lines apart where there are more than colours. The ground
+    truth is gray and takes none."""
     others = [name for name in names if name != TRUTH]
-    return {TRUTH: (TRUTH_COLOR, "-", "solid"), **{name: look(i) for i, name in enumerate(others)}}
+    return {TRUTH: (TRUTH_COLOR, "-", "solid"),
+            **{name: (COLORS[i % len(COLORS)], *DASHES[i // len(COLORS) % len(DASHES)]) for i, name in enumerate(others)}}
 
 
 def sheet(panels, width="text", columns=3, height_in=None):

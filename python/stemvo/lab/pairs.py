@@ -7,6 +7,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from stemvo.lab.disturbances import levels
+
 Disturbance = Callable[[np.ndarray, np.ndarray, np.random.Generator], tuple[np.ndarray, np.ndarray]]
 SENSOR_NOISE = 1.5  # gray levels, of every image but those that are made of noise or compressed
 
@@ -66,7 +68,7 @@ def rain(before, after, rng):
 
 def jpeg(before, after, rng):
     quality = int(rng.integers(7, 40))
-    return tuple(cv2.imdecode(cv2.imencode(".jpg", _bytes(image), [cv2.IMWRITE_JPEG_QUALITY, quality])[1], cv2.IMREAD_GRAYSCALE)
+    return tuple(cv2.imdecode(cv2.imencode(".jpg", levels(image), [cv2.IMWRITE_JPEG_QUALITY, quality])[1], cv2.IMREAD_GRAYSCALE)
                  for image in (before, after))
 
 
@@ -77,10 +79,6 @@ DISTURBANCES: dict[str, Disturbance] = {
     "noise": noise, "dusk": dusk,
     "blur": lambda before, after, rng: (before, cv2.GaussianBlur(after, (0, 0), rng.uniform(0.5, 1.8))),
     "low contrast": low_contrast, "fog": fog, "shadow": shadow, "rain": rain, "jpeg": jpeg}
-
-
-def _bytes(image: np.ndarray) -> np.ndarray:
-    return np.clip(np.round(image), 0, 255).astype(np.uint8)
 
 
 def _half_motion(size: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
@@ -101,4 +99,4 @@ def plant(frame: np.ndarray, disturbance: str, rng: np.random.Generator) -> Pair
     before, after = DISTURBANCES[disturbance](before, after, rng)
     if disturbance != "jpeg":
         before, after = (image + rng.normal(0, SENSOR_NOISE, image.shape) for image in (before, after))
-    return Pair(_bytes(before), _bytes(after), (half @ half)[:2])
+    return Pair(levels(before), levels(after), (half @ half)[:2])

@@ -129,11 +129,12 @@ def figure_1(layers, sequence, number, out):
     figure, axes = figures.sheet(1 + len(layers), columns=2, height_in=1.25 * -(-(1 + len(layers)) // 2))
     axes[0].imshow(image, cmap="gray")
     axes[0].set_title(f"(a) KITTI {sequence.name}, the input")
-    for letter, axis, layer in zip("bcdefghijklmnopqrstuvwxyz", axes[1:], layers):
+    for panel, (axis, layer) in enumerate(zip(axes[1:], layers), 1):
         shown = min(number, layer.filters - 1)
         odometry = stemvo.Odometry(sequence.recording, layer.options(shown) | {"stem.tracking_resolution": "native"})
         odometry.process(image, time)
         axis.imshow(odometry.channel_image(), cmap="gray")
+        letter = chr(ord("a") + panel % 26) * (panel // 26 + 1)  # a to z, aa to zz
         axis.set_title(f"({letter}) {layer.network}, {layer.name}, filter {shown}", wrap=True, fontsize=7)
     for axis in axes:
         axis.set(xticks=[], yticks=[])
@@ -169,7 +170,8 @@ def write_document(out, names):
     """paper.tex, which LaTeX compiles, with all tables and figures; paper.md and paper.txt with the tables."""
     drawn = [name for name in CAPTIONS if (out / f"{name}.pdf").exists()]
     body = [rf"\input{{{name}.tex}}" for name in names]
-    body += [rf"\begin{{figure*}}\centering\includegraphics[width=\textwidth]{{{name}.pdf}}\caption{{{CAPTIONS[name]}}}\end{{figure*}}" for name in drawn]
+    fitted = r"\includegraphics[width=\textwidth,height=0.9\textheight,keepaspectratio]"
+    body += [rf"\begin{{figure*}}\centering{fitted}{{{name}.pdf}}\caption{{{CAPTIONS[name]}}}\end{{figure*}}" for name in drawn]
     (out / "paper.tex").write_text("\n".join([r"\documentclass[twocolumn]{article}", r"\usepackage{booktabs,graphicx}",
                                               r"\usepackage[margin=15mm]{geometry}", r"\begin{document}", *body, r"\end{document}"]) + "\n")
     for suffix in (".md", ".txt"):

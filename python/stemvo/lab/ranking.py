@@ -45,9 +45,7 @@ class Standing(typing.NamedTuple):
 def compare(scores):
     """candidate -> Score per drive; to candidate -> Standing. The best has the lowest geometric mean over drives."""
     ranked = {one: found for one, found in scores.items() if all(score.detected for score in found)}
-    if not ranked:
-        return {one: Standing("not detected") for one in scores}
-    best = min(ranked.values(), key=lambda found: sum(np.log(max(score.error, LEAST_PERCENT)) for score in found))
+    best = min(ranked.values(), key=lambda found: sum(np.log(max(score.error, LEAST_PERCENT)) for score in found), default=None)
     told = {one: Standing("not detected") for one in scores}
     for one, found in ranked.items():
         pairs = [Drive(mine.errors, its.errors, mine.block, mine.road) for mine, its in zip(found, best) if len(mine.errors) == len(its.errors)]

@@ -8,6 +8,7 @@ import pathlib
 
 import click
 import numpy as np
+import tqdm
 from scipy.spatial.transform import Rotation
 
 import stemvo
@@ -15,8 +16,7 @@ from stemvo.lab import bootstrap, score, work
 from stemvo.lab.disturbances import ALL, Disturbed, find
 from stemvo.lab.ranking import number
 from stemvo.lab.rows import Rows
-from stemvo.lab.runs import open_folder, options_of
-from stemvo.lab.search import program_hash
+from stemvo.lab.runs import open_folder, options_of, program_hash
 
 CONTROLS = ("gray", "red", "green", "blue", "log", "census", "orb", "sift")
 COLORS = {"red": 0, "green": 1, "blue": 2}
@@ -202,7 +202,7 @@ def kinds_help():
 @click.option("--controls", default="", help=f"Only these: {', '.join(CONTROLS)}, or other filters, MODEL:K")
 @click.option("--config", help="Configuration of the judged channel.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="A key of the configuration.")
-@click.option("--jobs", type=int, help="Processes; default: one per core.")
+@click.option("--jobs", type=click.IntRange(1), help="Processes; default: one per core.")
 @click.option("--address", help="Of a Ray cluster; else this machine alone.")
 @click.option("--ray/--no-ray", default=True, help="Processes of our own in place of Ray.")
 def command(drives, out, frames, kinds, controls, config, overrides, jobs, address, ray):
@@ -232,12 +232,10 @@ def command(drives, out, frames, kinds, controls, config, overrides, jobs, addre
             for name, options in channels.items():
                 of = hashlib.sha256(f"{program} {sorted(options.items())} {has_true_steps}".encode()).hexdigest()[:16]
                 tasks[kind, strength, drive, name] = Task(name, tuple(options.items()), has_true_steps, drive, kind, strength), (of, drive.name, hashes[drive], kind, strength)
-    from tqdm import tqdm
-
     missing = {task: key for task, key in tasks.values() if rows.get(key) is None}
     if missing:
         with work.workers(jobs, address, ray) as workers:
-            for task, row in tqdm(work.run(workers, outcome, missing), total=len(missing), unit=" runs", disable=None):
+            for task, row in tqdm.tqdm(work.run(workers, outcome, missing), total=len(missing), unit=" runs", disable=None):
                 rows.append([dict(zip(KEY, missing[task])) | row | {"channel": task.channel}])
                 if row["refused"]:
                     click.echo(f"{task.drive.name}, {task.disturbance} {task.strength}, {task.channel}: {row['refused']}", err=True)

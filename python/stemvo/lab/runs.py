@@ -44,14 +44,20 @@ def config_file(name):
     return next((file for file in ours if file.exists()), pathlib.Path(name))
 
 
+def image_sizes(folder):
+    """Names and sizes of a KITTI sequence's images, which tell others without being read."""
+    return "".join(f"{file.relative_to(folder)} {file.stat().st_size}\n" for file in sorted(folder.glob("image_*/*"))).encode()
+
+
 def published():
     """Official sequences and published numbers."""
     return json.loads(pathlib.Path(__file__).with_name("published.json").read_text())
 
 
 def options_of(config=None, overrides=(), model=None):
-    """Keys and values of a configuration file (`paper`: the program's own), of KEY=VALUE lines and of a model's file."""
-    values = {}
+    """Keys and values of a configuration file (`paper`: the program's own), of KEY=VALUE lines and of a model's file. The file's sampling
+    is its own model's: another model keeps it where it can."""
+    values, given = {}, {}
     if config:
         file = config_file(config)
         stemvo.Options.load(file)  # whose message names file and line
@@ -61,8 +67,13 @@ def options_of(config=None, overrides=(), model=None):
         key, found, value = line.partition("=")
         if not found:
             raise ValueError(f"--set: expected KEY=VALUE, found '{line}'")
-        values[key] = value
-    return values | ({"stem.model": str(model)} if model else {})
+        given[key] = value
+    given |= {"stem.model": str(model)} if model else {}
+    if "stem.model" in given and (sampling := values.get("stem.sampling_px")):
+        stride, is_native = stemvo._core.model_stride(given["stem.model"])
+        if stride % sampling or (is_native and sampling != stride):
+            del values["stem.sampling_px"]
+    return values | given
 
 
 @dataclasses.dataclass(frozen=True)
@@ -121,9 +132,7 @@ class Sequence:
     @functools.cached_property
     def identity(self):
         """Hash of the images' names and sizes, calibration, times and true poses."""
-        hashed = hashlib.sha256(f"{len(self)}".encode())
-        for file in sorted(self.path.glob("image_*/*")):
-            hashed.update(f"{file.relative_to(self.path)} {file.stat().st_size}\n".encode())
+        hashed = hashlib.sha256(f"{len(self)}".encode() + image_sizes(self.path))
         for file in (self.path / "calib.txt", self.path / "times.txt", self.path.parent.parent / "poses" / f"{self.name}.txt"):
             hashed.update(file.read_bytes() if file.exists() else b"none")
         return hashed.hexdigest()
@@ -141,13 +150,17 @@ def sequences_of(kitti, names=(), frames=None):
 
 
 @functools.cache
-def program_identity():
-    return hashlib.sha256(pathlib.Path(stemvo._core.__file__).read_bytes()).hexdigest()
+def program_hash():
+    """A build without a clean commit has a version that does not change with its code."""
+    version = stemvo.__version__
+    if "+" in version and not version.endswith(".dirty"):
+        return version
+    return version + hashlib.sha256(pathlib.Path(stemvo._core.__file__).read_bytes()).hexdigest()
 
 
 def _identity(method, sequence):
     """Hash of everything that poses and errors depend on."""
-    hashed = hashlib.sha256(f"{program_identity()} {sequence.identity} {method.scale}".encode())
+    hashed = hashlib.sha256(f"{program_hash()} {sequence.identity} {method.scale}".encode())
     if method.folder is not None:
         hashed.update(trajectory_file(method, sequence).read_bytes())
         return hashed.hexdigest()
@@ -192,12 +205,6 @@ def others_poses(method, sequence):
     return poses[:len(sequence)]
 
 
-def measure(poses, truth, align="none"):
-    """evaluate()'s numbers; ATE always after Sim(3)."""
-    found = stemvo.evaluate(poses, truth, align)
-    return {name: found[name] for name in METRICS} | {"ate_rmse_m": found["ate_rmse_m"]["sim3"]}
-
-
 def run(method, sequence, folder, progress=None):
     """A row (its state is done, failed or not possible) and Nx4x4 or None. Kept in `folder`: not computed again while program,
     options, model, frames, calibration and ground truth are the same."""
@@ -234,5 +241,6 @@ def _compute(method, sequence, row, progress):
     if in_units and method.scale == ROAD:
         row["problem"] = "no road was believed: the path is in units"
     if sequence.truth is not None:
-        row |= measure(poses[sequence.recording.ground_truth_frames], sequence.truth, row["alignment"])
+        found = stemvo.evaluate(poses[sequence.recording.ground_truth_frames], sequence.truth, row["alignment"])
+        row |= {name: found[name] for name in METRICS} | {"ate_rmse_m": found["ate_rmse_m"]["sim3"]}  # always after Sim(3)
     return row, poses

@@ -11,6 +11,7 @@ import numpy as np
 
 import stemvo
 from stemvo import _core
+from stemvo.lab.runs import image_sizes
 
 MIN_SIDE_PX = 16  # of a channel: room for the windows of a tracker and for motion
 MIN_TRACKED = 0.5  # share of the motions that are measured; less: the pose was not detected
@@ -39,6 +40,8 @@ class Drive:
         recording = stemvo.read_recording(self.path, frames=self.frames, input_camera=self.camera)
         if recording.ground_truth is None or len(recording.ground_truth) != len(recording):
             raise ValueError(f"{self.path}: expected a true pose for each frame, found {0 if recording.ground_truth is None else len(recording.ground_truth)} of {len(recording)}")
+        if len(recording) < 2:
+            raise ValueError(f"--{'held-out-' * self.held_out}frames: expected 2 frames or more of {self.path}, found {len(recording)}")
         if not self.kind:
             return recording
         from stemvo.lab.disturbances import Disturbed, find
@@ -46,9 +49,9 @@ class Drive:
         return Disturbed(recording, find(self.kind), 1)
 
     def hash(self):
-        """Of times, truth, camera and images by name: what a row depends on."""
-        recording = stemvo.read_recording(self.path, frames=self.frames, input_camera=self.camera)
-        parts = [recording.timestamps.tobytes(), recording.ground_truth.tobytes(), repr(recording.camera).encode(), (self.kind or "").encode(),
+        """Of times, truth, camera and images by name and size: what a row depends on."""
+        recording = self.open()
+        parts = [recording.timestamps.tobytes(), recording.ground_truth.tobytes(), repr(recording.camera).encode(), (self.kind or "").encode(), image_sizes(pathlib.Path(self.path)),
                  *(image.tobytes() for image in (recording[0][0], recording[len(recording) - 1][0]) if image is not None)]
         return hashlib.sha256(b"".join(parts)).hexdigest()[:16]
 

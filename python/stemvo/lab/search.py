@@ -6,16 +6,18 @@ import dataclasses
 import hashlib
 import os
 import pathlib
+import re
 import time
 
 import click
 import numpy as np
+import tqdm
 
 import stemvo
 from stemvo import _core
 from stemvo.lab import ranking, score, work
 from stemvo.lab.rows import Rows
-from stemvo.lab.runs import open_folder, options_of
+from stemvo.lab.runs import open_folder, options_of, program_hash
 
 # A run's odometry made cheap: pairs of frames, fewer points, steps of the true length.
 DEFAULTS = {"odometry.mode": "two_frame", "scale.source": "ground_truth", "features.max_features": 400, "features.klt_window": 23,
@@ -42,19 +44,13 @@ class Layer:
         return score.Block(self.model, filters, drive, self.options)
 
 
-def program_hash():
-    """A build without a clean commit has a version that does not change with its code."""
-    version = stemvo.__version__
-    if "+" in version and not version.endswith(".dirty"):
-        return version
-    return version + hashlib.sha256(pathlib.Path(_core.__file__).read_bytes()).hexdigest()
-
-
-def layer_of(model, values, is_baseline=False, **more):
+def layer_of(model, config, overrides, is_baseline=False, **more):
+    values = ({} if config else DEFAULTS) | options_of(config, overrides, model) | {"scale.source": "ground_truth"}
+    dropped = ("stem.model", "stem.filter", *["stem.sampling_px"] * is_baseline)
     stride, is_native = _core.model_stride(model)
     if stride > 2 and stride % 2 == 0 and not is_native and not values.get("stem.sampling_px"):
         more["stem.sampling_px"] = stride // 2  # shifted passes of a coarse layer cost more than more of them tell
-    values = {key: value for key, value in values.items() if key not in ("stem.model", "stem.filter")} | more
+    values = {key: value for key, value in values.items() if key not in dropped} | more
     settings = stemvo.Options(values | {"threads": 1})
     stem = _core.Stem(stemvo.Options(values | {"stem.model": model}))
     return Layer(model, pathlib.Path(model).stem if model.endswith(".onnx") else model, hashlib.sha256(_core.model_bytes(model)).hexdigest()[:16], stem.layer or "input",
@@ -62,13 +58,22 @@ def layer_of(model, values, is_baseline=False, **more):
                  hashlib.sha256((program_hash() + str(settings)).encode()).hexdigest()[:16], is_baseline)
 
 
-def layers_of(models, values, baselines):
-    layers = [layer_of(str(pathlib.Path(model).resolve()) if model.endswith(".onnx") else model, values) for model in models]
+def layers_of(models, config, overrides, baselines):
+    layers = [layer_of(str(pathlib.Path(model).resolve()) if model.endswith(".onnx") else model, config, overrides) for model in models]
     if baselines:
-        layers += [layer_of("gray", values, True, **{"features.method": "orb"}), layer_of("input_layer", values, True)]
+        layers += [layer_of("gray", config, overrides, True, **{"features.method": "orb"}), layer_of("input_layer", config, overrides, True)]
     if twice := [name for name, count in collections.Counter((one.name, one.features) for one in layers).items() if count > 1]:
         raise ValueError(f"--model: expected each name once, found '{twice[0][0]}' again")
     return layers
+
+
+def filters_of(layer, text):
+    """A:B, A: or :B."""
+    ends = re.fullmatch(r"(\d*):(\d*)", text)
+    first, last = (int(ends[1] or 0), int(ends[2] or layer.num_filters)) if ends else (0, 0)
+    if not first < last <= layer.num_filters:
+        raise ValueError(f"--filters: expected A:B inside 0:{layer.num_filters} for {layer.name}, found '{text}'")
+    return range(first, last)
 
 
 def part_of(candidates, shard):
@@ -83,9 +88,8 @@ def part_of(candidates, shard):
 class Search:
     """Candidates are (layer, filter). Rows that are there are not computed again."""
 
-    def __init__(self, drives, rows, candidates, workers, progress=None):
-        self.drives, self.rows, self.candidates, self.workers = drives, rows, candidates, workers
-        self.progress = progress or (lambda frames: None)
+    def __init__(self, drives, rows, candidates, workers, progress):
+        self.drives, self.rows, self.candidates, self.workers, self.progress = drives, rows, candidates, workers, progress
         self._hashes = {drive: drive.hash() for drive in drives}
         self._lengths = {drive: len(drive.open()) for drive in drives}
         self._kept, self._blocks = {}, {}
@@ -222,8 +226,8 @@ def write_results(out, table):
 @click.option("--config", help="Configuration in place of the search's own cheap one.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="A key of the configuration.")
 @click.option("--rows", "others", multiple=True, type=click.Path(exists=True, dir_okay=False), help="rows.csv of another search: its rows count too.")
-@click.option("--plan", "planned", type=int, help="Only say what so many filters would take.")
-@click.option("--jobs", type=int, help="Processes; default: one per core.")
+@click.option("--plan", "planned", type=click.IntRange(1), help="Only say what so many filters would take.")
+@click.option("--jobs", type=click.IntRange(1), help="Processes; default: one per core.")
 @click.option("--address", help="Of a Ray cluster; else this machine alone.")
 @click.option("--ray/--no-ray", default=True, help="Processes of our own in place of Ray.")
 def command(drives, models, out, frames, held_out, held_out_frames, kinds, filters, shard, exhaustive, baselines, config, overrides, others, planned, jobs,
@@ -234,25 +238,20 @@ def command(drives, models, out, frames, held_out, held_out_frames, kinds, filte
     and adds drives, models or filters. After a quarter, half and three quarters of the frames, filters that are worse than the best at 95 %
     by a paired moving-block bootstrap are stopped.
     """
-    values = options_of(config, overrides) if config else DEFAULTS | options_of(None, overrides)
-    layers = layers_of(models, values | {"scale.source": "ground_truth"}, baselines)
+    layers = layers_of(models, config, overrides, baselines)
     seen = [score.Drive(str(pathlib.Path(drive).resolve()), frames, kind or None) for kind in ["", *filter(None, kinds.split(","))] for drive in drives]
     seen += [score.Drive(str(pathlib.Path(drive).resolve()), held_out_frames, held_out=True) for drive in held_out]
     if twice := [name for name, count in collections.Counter((drive.name, drive.held_out) for drive in seen).items() if count > 1]:
         raise ValueError(f"DRIVE: expected each name once, found {twice[0][0]} twice")
-    jobs = jobs or (None if address else len(os.sched_getaffinity(0)))
     if planned:
-        return click.echo(plan(planned, layers, seen, jobs or 1))
-    first, _, last = (filters or ":").partition(":")
-    candidates = [(layer, k) for layer in layers if not layer.is_baseline for k in range(layer.num_filters)[int(first or 0) : int(last) if last else None]]
+        return click.echo(plan(planned, layers, seen, jobs or len(os.sched_getaffinity(0))))
+    candidates = [(layer, k) for layer in layers if not layer.is_baseline for k in filters_of(layer, filters or ":")]
     candidates = part_of(candidates, shard) if shard else candidates
     candidates += [(layer, k) for layer in layers if layer.is_baseline for k in range(layer.num_filters)]
     open_folder(out, "search", [*(f"{drive}/times.txt" for drive in (*drives, *held_out)), *models, *others, config])
     rows = Rows(out / "rows.csv", COLUMNS, len(KEY), others)
     shares = SHARES[-1:] if exhaustive else SHARES
-    from tqdm import tqdm
-
-    with work.workers(jobs, address, ray) as workers, tqdm(unit=" filter-frames", disable=None) as bar:
+    with work.workers(jobs, address, ray) as workers, tqdm.tqdm(unit=" filter-frames", disable=None) as bar:
         search = Search(seen, rows, candidates, workers, bar.update)
         search.race(shares)
     table = search.table(shares)

@@ -7,7 +7,8 @@ _LATEX = {"\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"
           "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}"}
 LEFT = ("frames", "method", "scale from", "alignment", "note", "ran on")  # columns of words
 PAGE_ROWS, MORE = 45, " (continued)"
-WIDEST = 5  # columns of a table in one of two columns of text
+WIDEST = 48  # letters in a row of a table that fits into one of two columns of text
+_FIT = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"  # made smaller, never larger
 
 
 def cell(value, decimals=2):
@@ -30,17 +31,16 @@ def markdown(frame):
 
 
 def latex(frame, caption, notes=()):
-    """A table by the packages booktabs and graphicx, of as many parts as fit pages; a wide one is as wide as the text. Numbers are right."""
+    """A table by the packages booktabs and graphicx, of as many parts as fit pages; a wide one goes over both columns. Numbers are right."""
     if len(frame) > PAGE_ROWS:
         return latex(frame[:PAGE_ROWS], caption, notes) + latex(frame[PAGE_ROWS:], f"{caption.removesuffix(MORE)}{MORE}")
     rows = [" & ".join(map(_escaped, row)) + r" \\" for row in [list(frame.columns), *frame.values.tolist()]]
     kinds = "".join("l" if i == 0 or name in LEFT else "r" for i, name in enumerate(frame.columns))
-    is_wide = len(frame.columns) > WIDEST
-    environment = "table*" if is_wide else "table"
-    lines = [rf"\begin{{{environment}}}", r"\centering", rf"\caption{{{_escaped(caption)}}}", r"\resizebox{\textwidth}{!}{%" if is_wide else None,
-             rf"\begin{{tabular}}{{{kinds}}}", r"\toprule", rows[0], r"\midrule", *rows[1:], r"\bottomrule", r"\end{tabular}" + "}" * is_wide,
+    environment = "table*" if max(map(len, text(frame).splitlines())) > WIDEST else "table"
+    lines = [rf"\begin{{{environment}}}", r"\centering", rf"\caption{{{_escaped(caption)}}}", _FIT,
+             rf"\begin{{tabular}}{{{kinds}}}", r"\toprule", rows[0], r"\midrule", *rows[1:], r"\bottomrule", r"\end{tabular}}",
              *(rf"\par\footnotesize {_escaped(note)}" for note in notes), rf"\end{{{environment}}}"]
-    return "\n".join(line for line in lines if line is not None) + "\n"
+    return "\n".join(lines) + "\n"
 
 
 def _escaped(text):

@@ -113,7 +113,7 @@ def table(result: Mapping[str, Mapping[str, Sequence[Landed]]]) -> str:
 @click.command()
 @click.argument("recordings", nargs=-1, required=True)
 @click.option("--channel", "channels", multiple=True, default=("default", "gray"), show_default=True, help="MODEL or MODEL:FILTER, as stem.model and stem.filter.")
-@click.option("--frames", default=12, show_default=True, help="Of each recording, evenly along it.")
+@click.option("--frames", type=click.IntRange(1), default=12, show_default=True, help="Of each recording, evenly along it.")
 @click.option("--far", is_flag=True, help=f"Starts up to {FAR:g} px off (default: {NEAR:g}).")
 @click.option("--seed", default=1, show_default=True)
 @click.option("--json", "out", type=click.Path(dir_okay=False), help="The rows, as a file.")
