@@ -95,16 +95,17 @@ bool cut_fine(const BorderedImage& image, float x, float y, Patch& patch) {
   if (solver.info() != Eigen::Success || !(solver.rcond() > kMinCondition)) {
     return false;
   }
-  const Eigen::Matrix<float, 4, kFineSide * kFineSide> step = solver.solve(columns.transpose());
-  for (std::size_t k = 0; k < 4; ++k) {
-    PatchVector(patch.step[k].data()) = step.row(static_cast<Eigen::Index>(k)).transpose();
-  }
-  const Eigen::Matrix<float, 2, kFineSide * kFineSide> translation =
-      hessian.topLeftCorner<2, 2>().inverse() * columns.leftCols<2>().transpose();
-  for (std::size_t k = 0; k < 2; ++k) {
-    PatchVector(patch.translation_step[k].data()) =
-        translation.row(static_cast<Eigen::Index>(k)).transpose();
-    patch.translation_step[k + 2].fill(0.0F);
+  const Eigen::Matrix4f inverse = solver.solve(Eigen::Matrix4f::Identity());
+  const Eigen::Matrix2f of_translation = hessian.topLeftCorner<2, 2>().inverse();
+  for (int k = 0; k < 4; ++k) {
+    const auto index = static_cast<std::size_t>(k);
+    PatchVector(patch.step[index].data()) = columns * inverse.col(k);
+    PatchVector translation(patch.translation_step[index].data());
+    if (k < 2) {
+      translation = columns.leftCols<2>() * of_translation.col(k);
+    } else {
+      translation.setZero();
+    }
   }
   return true;
 }
