@@ -52,9 +52,11 @@ Frame ChannelOdometry::prepare(const Channel& channel,
   const ChannelImage seen = timed(Stage::kContrast, [&] { return contrast_.apply(channel); });
   frame.times.stem_ms = watch.lap_ms();
   frame.pyramid = front_end_->prepare(seen, hints.mask);
-  if (asks_road_ && shows_texture(image, given_camera_)) {
+  if (asks_road_) {
     const StageTimer timer(Stage::kRoadImage);
-    const ChannelImage road = road_contrast_.apply(road_channel(image, given_camera_));
+    const cv::Mat seen =
+        shows_texture(image, given_camera_) ? image : cv::Mat::zeros(image.size(), image.type());
+    const ChannelImage road = road_contrast_.apply(road_channel(seen, given_camera_));
     frame.road = std::make_shared<RoadImage>(make_road_image(road, given_camera_));
   }
   return frame;

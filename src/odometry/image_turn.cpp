@@ -49,8 +49,11 @@ struct Sums {
 
   /// Normalized; -1 where one of the two is plain.
   [[nodiscard]] double correlation() const {
-    const double variances = (aa - a * a / count) * (bb - b * b / count);
-    return variances > 0.0 ? (ab - a * b / count) / std::sqrt(variances) : -1.0;
+    constexpr double kPlain = 1e-4;  // gray values squared: less is rounding
+    const double of_a = aa - a * a / count;
+    const double of_b = bb - b * b / count;
+    return std::min(of_a, of_b) > kPlain * count ? (ab - a * b / count) / std::sqrt(of_a * of_b)
+                                                 : -1.0;
   }
 };
 
@@ -59,8 +62,8 @@ struct Sums {
 /// derivatives serve all iterations.
 struct Template {
   using Row =
-      Eigen::Array<float, 8, 1>;  ///< by the turn (3), by gain, by bias; 5: the error's place
-  std::vector<Eigen::Vector2f> plane;
+      Eigen::Array<float, 8, 1>;       ///< by the turn (3), by gain, by bias; 5: the error's place
+  std::vector<Eigen::Vector2f> plane;  ///< where z = 1
   std::vector<Row> rows;
 
   explicit Template(const Level& level) {
@@ -174,11 +177,10 @@ double align_level(const Template& prev, const Level& cur, Eigen::Quaterniond& t
     const Matrix5d normal = products.topLeftCorner<5, 5>().matrix().cast<double>();
     const Eigen::LDLT<Matrix5d> solver(normal);
     const Vector5d step = -solver.solve(products.col(5).head<5>().matrix().cast<double>());
-    if (num < 5 || !step.allFinite()) {
+    if (num < 5 || !step.allFinite() || !(gain + step[3] > 0.0)) {
       return kUnknown;
     }
-    const Eigen::Vector3d by =
-        step.head<3>() / gain;  // of what `prev`, gain times as strong, shows
+    const Eigen::Vector3d by = step.head<3>() / gain;  // `cur` is gain times as steep
     turn = turn * so3_exp(by);
     const Eigen::Matrix3d variances = solver.solve(Matrix5d::Identity()).topLeftCorner<3, 3>();
     const double mean = static_cast<double>(sum) / num;
@@ -186,9 +188,6 @@ double align_level(const Template& prev, const Level& cur, Eigen::Quaterniond& t
     gain += step[3];
     bias += step[4];
     scale = 2.0 * mean;
-    if (!(gain > 0.0)) {
-      return kUnknown;
-    }
     if (i > 0 && by.norm() * cur.focal_px.mean() < kConverged_px) {
       break;
     }

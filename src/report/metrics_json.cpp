@@ -16,8 +16,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kFewBelieved = 0.5;  ///< a smaller share is warned of
-constexpr double kMostTracked = 0.5;  ///< the same
-constexpr double kInPlace = 0.95;     ///< a larger share of such frames is told
+constexpr double kFewTracked = 0.5;   ///< a smaller share of frames that were measured is, too
+constexpr double kInPlace = 0.95;     ///< a larger share of frames in place is told
 
 std::string scale_explained(const MetricsReport& report) {
   const std::string& source = report.scale_source;
@@ -237,7 +237,7 @@ std::array<std::string, 10> metric_texts(const Metrics& metrics) {
 }
 
 std::string warn_of_gaps(const MetricsReport& report) {
-  return report.tracked_fraction >= kMostTracked
+  return report.tracked_fraction >= kFewTracked
              ? ""
              : fmt::format(
                    "tracked: {:.1f} % of the frames only have a measured pose; the others' are a "

@@ -88,7 +88,8 @@ struct LightChange {
 };
 
 /// A channel as few values, each the mean of so large a square that what moves between two frames
-/// hardly changes it. Squares of whole pixels are ten times as fast as others.
+/// hardly changes it. Squares of whole pixels are several times as fast as others; what they leave
+/// at the right and below is not looked at.
 cv::Mat light_values(const cv::Mat& channel) {
   const cv::Size size = channel.size() / kSquare_px;
   cv::Mat values;

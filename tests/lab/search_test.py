@@ -80,7 +80,7 @@ def test_a_drive_too_short_for_a_segment_is_said(drive, tmp_path):
 
 @pytest.mark.parametrize(("more", "message"), [
     (["--shard", "2/2"], "--shard: expected I/N"), (["--model", "default"], "'default' again"), (["--set", "features.nothing=3"], "features.nothing"),
-    (["--filters", "abc"], "--filters: expected A:B inside 0:3 for input_layer, found 'abc'"), (["--filters", "2:4"], "found '2:4'"), (["--frames", "0:1"], "--frames: expected 2 frames or more")])
+    (["--filters", "abc"], "--filters: expected A:B inside 0:3 for input_layer, found 'abc'"), (["--filters", "2:4"], "found '2:4'"), (["--frames", "0:1"], "expected 2 frames or more")])
 def test_bad_input_is_one_line(drive, tmp_path, more, message):
     done = CliRunner().invoke(main, arguments(drive, tmp_path, *more))
     assert done.exit_code == 1 and message in done.output and len(done.output.splitlines()) == 1, done.output

@@ -122,7 +122,7 @@ TEST_F(SigmaOfScale, IsAsLargeAsTheErrors) {
     }
     return sum;
   };
-  // Over 24 steps, as those of one frame are not the scale's errors alone.
+  // Over 24 steps: the length of one has errors of its own.
   constexpr std::size_t kReach = 12;
   double squares = 0.0;
   int num = 0;

@@ -94,6 +94,9 @@ TEST(OdometryCreate, ALensIsTakenOutOfTheImagesAndTheMaskInside) {
   distorted.distortion = Distortion::kNone;
   distorted.distortion_coefficients = {-0.2};
   EXPECT_THAT(error_of({}, distorted), HasSubstr("0 beyond the 0 of its model, found [-0.2"));
+  distorted.distortion = Distortion::kEquidistant;
+  distorted.distortion_coefficients = {0.0, 0.0, 0.0, 0.0, 0.1};
+  EXPECT_THAT(error_of({}, distorted), HasSubstr("0 beyond the 4 of its model"));
 }
 
 TEST(OdometryCreate, MetresAreClaimedOnlyWithAHeight) {

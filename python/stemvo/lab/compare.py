@@ -179,7 +179,7 @@ def write_report(out, title, found, lines, positions, note, width):
 @click.option("--names", help="Joined by commas, in the order of A B ..")
 @click.option("--camera", type=click.Path(exists=True, path_type=pathlib.Path), help="With EuRoC's truth: whose T_BS counts")
 @click.option("--tolerance", default=0.01, show_default=True, help="Seconds between a pose and its true one")
-@click.option("--first", type=click.IntRange(0), help="Line of the truth (from 0) that files without times begin at")
+@click.option("--first", type=click.IntRange(0), help="Line of the truth (from 0) that all files without times begin at; times pair by themselves")
 @click.option("--width", type=click.Choice(list(figures.WIDTHS_IN)), default="column", show_default=True, help="Of the figures: of a paper's")
 def command(given, gt, out, align, names, camera, tolerance, first, width):
     """Results of `stemvo run`, or trajectory files of any program (KITTI, TUM, EuRoC), compared."""

@@ -41,7 +41,7 @@ class Drive:
         if recording.ground_truth is None or len(recording.ground_truth) != len(recording):
             raise ValueError(f"{self.path}: expected a true pose for each frame, found {0 if recording.ground_truth is None else len(recording.ground_truth)} of {len(recording)}")
         if len(recording) < 2:
-            raise ValueError(f"--{'held-out-' * self.held_out}frames: expected 2 frames or more of {self.path}, found {len(recording)}")
+            raise ValueError(f"{self.path}: expected 2 frames or more (--frames), found {len(recording)}")
         if not self.kind:
             return recording
         from stemvo.lab.disturbances import Disturbed, find

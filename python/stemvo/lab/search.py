@@ -219,7 +219,7 @@ def write_results(out, table):
 @click.option("--held-out", multiple=True, type=click.Path(exists=True, file_okay=False), help="A drive that judges and never ranks.")
 @click.option("--held-out-frames", help="A:B of these.")
 @click.option("--kinds", default="", help="Each drive ranks also under these disturbances (stemvo-lab robustness), KIND,..")
-@click.option("--filters", help="A:B of each model.")
+@click.option("--filters", help="A:B, A: or :B, which each model must have.")
 @click.option("--shard", help="I/N: the I-th of N parts of the filters.")
 @click.option("--exhaustive", is_flag=True, help="No filter is stopped early.")
 @click.option("--baselines/--no-baselines", default=True, help="ORB on gray, and the input's R, G and B.")

@@ -76,8 +76,11 @@ double of_correlation(const RoadEvidence& e) {
 
 void RoadBelief::add(const RoadEvidence& e) {
   const bool is_measured = e.measured_share > 0.0;
+  // Of what was never measured no landmark tells that it is the road.
+  const double landmarks = of_landmarks(e);
+  const bool may_tell = is_measured || is_believed_;
   const std::array<std::pair<double, std::string_view>, 5> told = {{
-      {of_landmarks(e), "landmarks are not on it"},
+      {may_tell ? landmarks : std::min(0.0, landmarks), "landmarks are not on it"},
       {is_measured ? of_innovation(e) : 0.0, "its scale jumps"},
       {is_measured ? of_correlation(e) : 0.0, "the images hardly agree"},
       {unlikely(e.profile_chi2), "it tilts against the way driven"},

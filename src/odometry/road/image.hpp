@@ -26,8 +26,8 @@ struct RoadImage {
 /// it for long focal lengths.
 [[nodiscard]] Channel road_channel(const cv::Mat& image, const Camera& camera);
 
-/// False: the image below the horizon shows so few gray levels that the steps between them look
-/// like a road's texture.
+/// False: gray values below the horizon spread so little that the steps between levels look like a
+/// road's texture.
 [[nodiscard]] bool shows_texture(const cv::Mat& image, const Camera& camera);
 
 [[nodiscard]] RoadImage make_road_image(const ChannelImage& image, const Camera& camera);
