@@ -54,9 +54,9 @@ Frame ChannelOdometry::prepare(const Channel& channel,
   frame.pyramid = front_end_->prepare(seen, hints.mask);
   if (asks_road_) {
     const StageTimer timer(Stage::kRoadImage);
-    const cv::Mat seen =
+    const cv::Mat shown =
         shows_texture(image, given_camera_) ? image : cv::Mat::zeros(image.size(), image.type());
-    const ChannelImage road = road_contrast_.apply(road_channel(seen, given_camera_));
+    const ChannelImage road = road_contrast_.apply(road_channel(shown, given_camera_));
     frame.road = std::make_shared<RoadImage>(make_road_image(road, given_camera_));
   }
   return frame;
