@@ -98,7 +98,7 @@ Expected<cv::Mat> decode_png(Bytes bytes,
                              bool as_color,
                              const WantedSize& wanted,
                              bool keeps_16_bits) {
-  // The chunks have checksums, too.
+  // The chunks' own checksums hold the pixels.
   const Context png = make_context(SPNG_CTX_IGNORE_ADLER32);
   spng_ihdr header{};
   cv::Mat image;

@@ -66,6 +66,8 @@ struct Template {
   std::vector<Eigen::Vector2f> plane;  ///< where z = 1
   std::vector<Row> rows;
 
+  [[nodiscard]] float value(std::size_t i) const { return -rows[i][3]; }
+
   explicit Template(const Level& level) {
     for (int y = 1; y + 1 < level.pixels.rows; ++y) {
       for (int x = 1; x + 1 < level.pixels.cols; ++x) {
@@ -121,7 +123,7 @@ void for_each_common(const Template& prev,
 double likeness(const Template& prev, const Level& cur, const Eigen::Quaterniond& cur_from_prev) {
   Sums sums;
   for_each_common(prev, cur, cur_from_prev, [&](std::size_t i, double now) {
-    const double value = -prev.rows[i][3];
+    const double value = prev.value(i);
     ++sums.count;
     sums.a += value;
     sums.b += now;
@@ -139,8 +141,8 @@ double mean_of(const Level& level) {
 
 double mean_of(const Template& level) {
   double sum = 0.0;
-  for (const Template::Row& row : level.rows) {
-    sum -= row[3];
+  for (std::size_t i = 0; i < level.rows.size(); ++i) {
+    sum += level.value(i);
   }
   return sum / static_cast<double>(level.rows.size());
 }
@@ -165,7 +167,7 @@ double align_level(const Template& prev, const Level& cur, Eigen::Quaterniond& t
     int num = 0;
     for_each_common(prev, cur, turn, [&](std::size_t k, float now) {
       Template::Row row = prev.rows[k];
-      const float off = now + gain_now * row[3] - bias_now;
+      const float off = now - gain_now * prev.value(k) - bias_now;
       const float weight = 1.0F / (1.0F + std::pow(off * inverse_scale, 2.0F));
       row[5] = off;
       for (int column = 0; column < 6; ++column) {

@@ -105,6 +105,25 @@ TEST_F(RoadOfClip, IsNotBelievedBySoFewGrayLevels) {
   EXPECT_EQ(believed(), 0.0);
 }
 
+TEST_F(RoadOfClip, KeepsItsScaleOverFramesWithoutTexture) {
+  int frame = 0;
+  const auto dull = [&](cv::Mat& image) {
+    if (frame >= 40 && frame < 60) {
+      image = 126 + image / 64;
+    }
+    ++frame;
+  };
+  succeeded(run(dull, kCx_px, kCy_px));
+  const Words states = test::column(read_file(folder_ / "result/frames.csv"), "scale_state");
+  EXPECT_EQ(states[50], "held");
+  const auto path = read_kitti_trajectory(folder_ / "result/trajectory_kitti.txt").value();
+  const auto truth = read_kitti_trajectory(shared_data() / "kitti/poses/03.txt").value();
+  const auto way = [](const Trajectory& poses) {
+    return (poses[kFrames - 1].translation - poses[62].translation).norm();
+  };
+  EXPECT_NEAR(way(path) / way(truth), 1.0, 0.04);
+}
+
 class SigmaOfScale : public NeedsClips {};
 
 TEST_F(SigmaOfScale, IsAsLargeAsTheErrors) {

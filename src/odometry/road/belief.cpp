@@ -76,7 +76,7 @@ double of_correlation(const RoadEvidence& e) {
 
 void RoadBelief::add(const RoadEvidence& e) {
   const bool is_measured = e.measured_share > 0.0;
-  // Of what was never measured no landmark tells that it is the road.
+  // Landmarks do not tell that what was never measured is the road.
   const double landmarks = of_landmarks(e);
   const bool may_tell = is_measured || is_believed_;
   const std::array<std::pair<double, std::string_view>, 5> told = {{
