@@ -16,11 +16,16 @@ constexpr std::size_t kMinKeyframes = 3;
 constexpr int kMaxGuessed = 10;
 constexpr double kNewLogScale = 0.1;  ///< a unit that changes by more is another one
 constexpr double kTrack_px = 0.7;     ///< error of a track over the window
+/// Road and ways that differ by more, and by so many sigmas, are not both right.
+constexpr double kContradiction = 0.1;
+constexpr double kContradictionSigmas = 3.0;
+/// Where a way says what the road's scale is, the road is searched for as far around it.
+constexpr double kSearchSigma = 0.3;
 
 }  // namespace
 
 MetricScale::MetricScale(const Options& config, std::optional<double> drift_sigma)
-    : filter_(drift_sigma.value_or(kScaleDrift)) {
+    : filter_(drift_sigma.value_or(kScaleDrift)), road_filter_(filter_) {
   if (config.scale.source != ScaleSource::kCameraHeight) {
     return;
   }
@@ -37,6 +42,7 @@ void MetricScale::restart(const RoadImage* road, double time_s, bool has_scale) 
   }
   if (!has_scale) {
     filter_.restart();
+    road_filter_.restart();
     is_scale_proven_ = false;
     num_frames_ = 0;
   }
@@ -45,8 +51,43 @@ void MetricScale::restart(const RoadImage* road, double time_s, bool has_scale) 
   state_ = ScaleState::kNone;
   if (road_.has_value()) {
     road_->restart();
-    reason_ = road_->update(*road, {}, filter_).reason;
+    reason_ = road_->update(*road, {}, road_filter_).reason;
   }
+}
+
+double MetricScale::contradiction() const {
+  if (!is_road_believed_ || !is_way_measured_) {
+    return 0.0;
+  }
+  const double apart = std::abs(filter_.log_scale() - road_filter_.log_scale());
+  const double sigma = std::hypot(filter_.sigma(), road_->sigma(road_filter_));
+  return apart > std::max(kContradiction, kContradictionSigmas * sigma) ? apart : 0.0;
+}
+
+bool MetricScale::measure_road(const RoadImage& road,
+                               const Rigid3& cur_from_prev,
+                               const std::vector<RoadLandmark>& landmarks) {
+  if (filter_.is_initialized() && !road_filter_.is_initialized()) {
+    road_filter_.update(filter_.log_scale(), kSearchSigma, ScaleWitness::kRoad);
+  }
+  const RoadScaleEstimate estimate = timed(Stage::kRoadScale, [&] {
+    return road_->update(road, cur_from_prev, road_filter_, landmarks);
+  });
+  is_road_believed_ = estimate.is_believed;
+  reason_ = estimate.reason;
+  if (!has_ways_) {
+    filter_ = road_filter_;
+    return estimate.is_measured;
+  }
+  if (contradiction() > 0.0) {
+    reason_ = kRoadContradicted;
+    return false;
+  }
+  // A road that is not proven does not bend what ways have measured.
+  if (estimate.log_scale && (estimate.is_believed || !is_way_measured_)) {
+    filter_.update(estimate.log_scale->first, estimate.log_scale->second, ScaleWitness::kRoad);
+  }
+  return estimate.is_measured;
 }
 
 double MetricScale::measure(const RoadImage* road,
@@ -61,21 +102,10 @@ double MetricScale::measure(const RoadImage* road,
   }
   if (!road_.has_value() || cur_from_prev.translation.norm() > 0.0) {
     filter_.predict(interval_s);
+    road_filter_.predict(interval_s);
   }
-  bool is_measured = false;
-  if (road_.has_value() && road != nullptr) {
-    ScaleFilter with_road = filter_;
-    const RoadScaleEstimate estimate = timed(Stage::kRoadScale, [&] {
-      return road_->update(*road, cur_from_prev, with_road, landmarks);
-    });
-    // A road that is not proven does not bend what ways have measured.
-    if (estimate.is_believed || !is_way_measured_) {
-      filter_ = with_road;
-    }
-    is_measured = estimate.is_measured;
-    is_road_believed_ = estimate.is_believed;
-    reason_ = estimate.reason;
-  }
+  const bool is_measured = road_.has_value() && road != nullptr &&
+                           measure_road(*road, cur_from_prev, landmarks);
   const bool is_way_measured = ways_.measure(filter_);
   is_way_measured_ = is_way_measured_ || is_way_measured;
   state_ = is_measured || is_way_measured          ? ScaleState::kMeasured
@@ -91,6 +121,7 @@ double MetricScale::measure(const RoadImage* road,
   }
   const double metres_per_unit = std::exp(filter_.log_scale());
   filter_.shift(-std::log(metres_per_unit));
+  road_filter_.shift(-std::log(metres_per_unit));
   ways_.rescale(metres_per_unit);
   if (road_.has_value()) {
     road_->rescale(metres_per_unit);

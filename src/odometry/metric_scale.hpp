@@ -18,6 +18,9 @@
 
 namespace stemvo {
 
+/// FrameResult::road_reason of a road that is believed, but not what ways say.
+inline constexpr std::string_view kRoadContradicted = "it contradicts the speed";
+
 /// Metres per unit of an estimator, from the road (`scale.source: camera_height`), from ways that
 /// somebody else measured, or from both; without either every factor is 1. And what each frame's
 /// result says of it.
@@ -57,6 +60,7 @@ class MetricScale {
     const double interval_s = time_s - std::exchange(last_time_s_, time_s);
     if (is_enabled()) {
       filter_.predict(interval_s);
+      road_filter_.predict(interval_s);
       state_ = state_ == ScaleState::kMeasured ? ScaleState::kHeld : state_;
       reason_ = road_.has_value() ? reason : "";
     }
@@ -77,14 +81,23 @@ class MetricScale {
     result.road_reason = reason_;
     result.is_scale_new = result.is_scale_new || is_scale_new_;
     if (is_enabled()) {
-      result.scale_sigma = is_way_measured_    ? filter_.sigma()
+      result.scale_sigma = is_way_measured_    ? std::hypot(filter_.sigma(), contradiction())
                            : is_road_believed_ ? road_->sigma(filter_)
                                                : ScaleFilter::kUnknownSigma;
     }
   }
 
  private:
+  /// Gives the road this frame, and the filter what it says. Returns whether it was measured.
+  bool measure_road(const RoadImage& road,
+                    const Rigid3& cur_from_prev,
+                    const std::vector<RoadLandmark>& landmarks);
+  /// How far apart road and ways are, if they contradict each other; else 0.
+  [[nodiscard]] double contradiction() const;
+
   ScaleFilter filter_;
+  /// What the road says by itself: where a way said what to look for, it would be found.
+  ScaleFilter road_filter_;
   std::optional<RoadScale> road_;
   WayScale ways_;
   double last_time_s_ = 0.0;  ///< of the frame before

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "geometry/degrees.hpp"
+#include "odometry/metric_scale.hpp"
 #include "options/visit.hpp"
 #include "pipeline/map_result.hpp"
 #include "report/data_files.hpp"
@@ -215,9 +216,13 @@ class ResultWriter {
     const FrameResult& last = drive_.frames.back();
     report.camera = {last.camera, last.camera_sigma, last.radial};
     if (config.scale.source == ScaleSource::kCameraHeight) {
-      report.road_measured_fraction = share_of(drive_.frames, is_scale_measured);
+      report.road_measured_fraction = share_of(
+          drive_.frames, [](const FrameResult& frame) { return frame.road_reason.empty(); });
       report.road_believed_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
         return is_scale_measured(frame) || frame.scale_state == ScaleState::kHeld;
+      });
+      report.road_contradicted_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
+        return frame.road_reason == kRoadContradicted;
       });
     }
     if (truth_) {

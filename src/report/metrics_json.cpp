@@ -16,6 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kFewBelieved = 0.5;  ///< a smaller share is warned of
+constexpr double kFewContradicted = 0.05;
 constexpr double kFewTracked = 0.5;   ///< a smaller share of frames that were measured is, too
 constexpr double kInPlace = 0.95;     ///< a larger share of frames in place is told
 
@@ -213,6 +214,7 @@ Json metrics_document(const MetricsReport& report) {
                {"camera", report.camera},
                {"road_measured_fraction", report.road_measured_fraction},
                {"road_believed_fraction", report.road_believed_fraction},
+               {"road_contradicted_fraction", report.road_contradicted_fraction},
                {"alignment", report.metrics ? Json(to_string(report.metrics->alignment)) : Json()}};
   add_metrics(json, report.metrics);
   json["map"] = report.map;
@@ -254,6 +256,11 @@ std::string warn_of_road(const MetricsReport& report) {
                    "scale: a road was believed on {:.1f} % of the frames only; the others' "
                    "lengths are a guess (scale_state in frames.csv)",
                    100.0 * share)
+         : report.road_contradicted_fraction > kFewContradicted
+             ? fmt::format(
+                   "scale: road and speeds contradict each other on {:.1f} % of the frames; the "
+                   "speeds are followed (check scale.camera_height_m and the speeds' unit)",
+                   100.0 * report.road_contradicted_fraction)
              : "";
 }
 

@@ -58,6 +58,7 @@ struct MetricsReport {
   std::optional<double> road_measured_fraction;  ///< nullopt: the road is not asked
   /// Frames whose scale was in metres: `measured` or `held`; nullopt as above.
   std::optional<double> road_believed_fraction;
+  double road_contradicted_fraction = 0.0;  ///< frames whose speed says another scale
   std::optional<Metrics> metrics;
   std::optional<MapReport> map;        ///< nullopt: nothing is remembered
   std::optional<TimingReport> timing;  ///< nullopt: nobody asked, and the key is not in the file
@@ -68,7 +69,7 @@ struct MetricsReport {
   }
 };
 
-/// The warning about a road that was believed never or on few frames; empty where all is well.
+/// The warning about a road that was believed never, on few frames, or against speeds; else empty.
 [[nodiscard]] std::string warn_of_road(const MetricsReport& report);
 /// The same where most of the path is no measurement.
 [[nodiscard]] std::string warn_of_gaps(const MetricsReport& report);

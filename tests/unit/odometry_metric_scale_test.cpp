@@ -147,14 +147,19 @@ TEST_P(MetricScaleOf, AnImageThatIsMissingHoldsTheScale) {
       2.0 * kStep_m, 0.05 * kStep_m);
 }
 
-/// Metres per metre of a drive whose speed is given, beside a road that lies lower than its height
-/// says. Landmarks lie `ratio` times as far below the camera as the road does.
-double scale_beside_a_road(double ratio) {
+struct BesideARoad {
+  double metres_per_m = 1.0;
+  FrameResult last;
+};
+
+/// A drive whose speed is given, beside a road whose height is said to be `said` times the true
+/// one. Landmarks lie `ratio` times as far below the camera as the road does.
+BesideARoad scale_beside_a_road(double said, double ratio) {
   constexpr int kNumFrames = 30;
   const RoadDrive drive(kNumFrames);
   Options config = metric_config();
   const double height_m = config.scale.camera_height_m;
-  config.scale.camera_height_m = 1.08 * height_m;
+  config.scale.camera_height_m = said * height_m;
   MetricScale scale(config);
   WayInput input{ScaleSource::kCameraHeight};
   double units_per_m = 1.0;
@@ -170,12 +175,25 @@ double scale_beside_a_road(double ratio) {
     const Rigid3 motion(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * units_per_m});
     units_per_m *= scale.measure(drive.road_image(i, true).get(), motion, 0.1 * i, 0.01, landmarks);
   }
-  return units_per_m;
+  BesideARoad result{units_per_m, {}};
+  scale.report(result.last);
+  return result;
 }
 
 TEST(MetricScale, ARoadThatIsNotProvenDoesNotBendWhatSpeedsMeasure) {
-  EXPECT_NEAR(scale_beside_a_road(1.6), 1.0, 0.01);
-  EXPECT_GT(scale_beside_a_road(1.0), 1.02) << "one that is believed is joined with them";
+  EXPECT_NEAR(scale_beside_a_road(1.08, 1.6).metres_per_m, 1.0, 0.01);
+  const BesideARoad joined = scale_beside_a_road(1.08, 1.0);
+  EXPECT_GT(joined.metres_per_m, 1.02) << "one that is believed is joined with them";
+  EXPECT_EQ(joined.last.road_reason, "");
+}
+
+TEST(MetricScale, ASpeedWinsOverARoadThatContradictsItAndItIsSaid) {
+  for (const double said : {0.8, 1.25}) {
+    const BesideARoad apart = scale_beside_a_road(said, 1.0);
+    EXPECT_EQ(apart.last.road_reason, kRoadContradicted) << said;
+    EXPECT_NEAR(apart.metres_per_m, 1.0, 0.03) << said;
+    EXPECT_NEAR(apart.last.scale_sigma.value_or(0.0), std::abs(std::log(said)), 0.05) << said;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes,

@@ -35,6 +35,7 @@ MetricsReport example() {
           .camera = {{700.0, 710.0, 600.5, 180.25, 1241, 376}, CameraSigma{3.5, 0.5, 0.75}},
           .road_measured_fraction = 0.75,
           .road_believed_fraction = 0.875,
+          .road_contradicted_fraction = 0.03125,
           .metrics = metrics,
           .map = {},
           .timing = {}};
@@ -59,6 +60,7 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
       "model": "default", "filter": 7, "fps": 31.5, "tracked_fraction": 0.995,
       "scale_source": "ground_truth", "in_place_fraction": 0.0,
       "road_measured_fraction": 0.75, "road_believed_fraction": 0.875,
+      "road_contradicted_fraction": 0.03125,
       "maps": 2, "scale_new_frames": [1, 120], "map": null,
       "camera": {"fx_px": 700.0, "fy_px": 710.0, "cx_px": 600.5, "cy_px": 180.25, "k1": 0.0, "k2": 0.0,
                  "fx_sigma_px": 3.5, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75},
@@ -139,6 +141,8 @@ TEST(MetricsTable, SaysWhereARoadWasBelievedNeverOrSeldom) {
   EXPECT_THAT(format_metrics_table(report), HasSubstr("camera_height, no road believed"));
   report.road_believed_fraction.reset();
   EXPECT_EQ(warn_of_road(report), "");
+  report.road_contradicted_fraction = 0.4;
+  EXPECT_THAT(warn_of_road(report), HasSubstr("road and speeds contradict each other on 40.0 %"));
 }
 
 TEST(MetricsTable, SaysThatMostOfThePathIsNoMeasurement) {

@@ -135,10 +135,10 @@ void RoadScale::count(const std::vector<RoadLandmark>& landmarks,
   }
 }
 
-std::string_view RoadScale::measure(const Past& past,
-                                    const RoadImage& image,
-                                    ScaleFilter& filter,
-                                    const std::vector<RoadLandmark>& landmarks) {
+RoadScaleEstimate RoadScale::measure(const Past& past,
+                                     const RoadImage& image,
+                                     ScaleFilter& filter,
+                                     const std::vector<RoadLandmark>& landmarks) {
   const RoadPrior predicted = make_prior(past.now_from_past, filter);
   RoadPrior prior = predicted;
   const RoadStep step{past.image, image, past.now_from_past, prior, options_};
@@ -179,12 +179,17 @@ std::string_view RoadScale::measure(const Past& past,
   const bool is_near =
       joined.num > 0 && filter.update(joined.log_scale, joined.sigma, ScaleWitness::kRoad);
   frames_unmeasured_ = is_near ? 0 : frames_unmeasured_ + 1;
+  RoadScaleEstimate result;
   if (joined.num == 0) {
-    return options_.use_dense ? dense.reason : points.reason;
+    result.reason = options_.use_dense ? dense.reason : points.reason;
+    return result;
   }
-  return !is_near                 ? "differs from the frames before"
-         : !belief_.is_believed() ? belief_.doubt()
-                                  : "";
+  result.log_scale = {joined.log_scale, joined.sigma};
+  result.is_measured = is_near && belief_.is_believed();
+  result.reason = !is_near             ? "differs from the frames before"
+                  : result.is_measured ? ""
+                                       : belief_.doubt();
+  return result;
 }
 
 RoadScaleEstimate RoadScale::update(RoadImage image,
@@ -204,8 +209,7 @@ RoadScaleEstimate RoadScale::update(RoadImage image,
   RoadScaleEstimate result;
   const Past* past = pick_past(filter);
   if (past != nullptr) {
-    result.reason = measure(*past, image, filter, landmarks);
-    result.is_measured = result.reason.empty();
+    result = measure(*past, image, filter, landmarks);
     remember(std::move(image));
   } else if (past_.empty()) {
     result.reason = "first frame";

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <deque>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -22,6 +23,8 @@ namespace stemvo {
 struct RoadScaleEstimate {
   bool is_believed = false;      ///< it is the road; else the scale is a guess
   bool is_measured = false;      ///< this frame's road was measured and believed
+  /// What this frame's road says, log(metres per unit) and its sigma; nullopt: nothing.
+  std::optional<std::pair<double, double>> log_scale;
   std::string_view reason = "";  ///< where is_measured is false
 };
 
@@ -31,9 +34,9 @@ class RoadScale {
   explicit RoadScale(const RoadOptions& options) : options_(options) {}
 
   /// One call per frame with an image. `cur_from_prev`: the motion since the
-  /// last call, in units of the map (ignored at the first call and after restart()). The filter,
-  /// which others measure for too, says what is known now, and takes what is measured. The
-  /// landmarks, in the current camera, are witnesses of what is measured.
+  /// last call, in units of the map (ignored at the first call and after restart()). The filter
+  /// says what is known now, and takes what is measured. The landmarks, in the current camera, are
+  /// witnesses of what is measured.
   RoadScaleEstimate update(RoadImage image,
                            const Rigid3& cur_from_prev,
                            ScaleFilter& filter,
@@ -78,11 +81,11 @@ class RoadScale {
       past_.pop_back();
     }
   }
-  /// Both estimators, joined and given to the filter. Returns why nothing is believed, else empty.
-  std::string_view measure(const Past& past,
-                           const RoadImage& image,
-                           ScaleFilter& filter,
-                           const std::vector<RoadLandmark>& landmarks);
+  /// Both estimators, joined and given to the filter.
+  RoadScaleEstimate measure(const Past& past,
+                            const RoadImage& image,
+                            ScaleFilter& filter,
+                            const std::vector<RoadLandmark>& landmarks);
   /// Counts the landmarks seen through the strip of `road`.
   void count(const std::vector<RoadLandmark>& landmarks,
              const Rigid3& motion,
