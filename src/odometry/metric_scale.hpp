@@ -81,7 +81,7 @@ class MetricScale {
     result.road_reason = reason_;
     result.is_scale_new = result.is_scale_new || is_scale_new_;
     if (is_enabled()) {
-      result.scale_sigma = is_way_measured_    ? std::hypot(filter_.sigma(), contradiction())
+      result.scale_sigma = is_way_measured_ ? std::hypot(filter_.way_sigma_factor() * filter_.sigma(), contradiction())
                            : is_road_believed_ ? road_->sigma(filter_)
                                                : ScaleFilter::kUnknownSigma;
     }

@@ -24,6 +24,8 @@ constexpr double kFirstSigma = 0.1;
 /// Drift in a second between ways without a road: the path adds up ways, whose errors average out
 /// where it follows them; what is smoothed into neighbours lasts, an error at the start above all.
 constexpr double kWayDrift = 0.02;
+constexpr double kDistanceGain = 0.1;
+constexpr double kMaxDistance2 = 25.0;
 constexpr double kTrend_s = 10.0;  ///< a trend that nothing confirms is forgotten by 1 / e
 
 }  // namespace
@@ -52,6 +54,11 @@ bool ScaleFilter::update(double log_scale, double sigma, ScaleWitness witness) {
     sigma_ = std::min(std::hypot(sigma_, drift), kUnknownSigma);
   }
   const double innovation = log_scale - log_scale_;
+  const bool is_first = sigma_ >= kUnknownSigma;
+  if (!is_road) {
+    const double distance2 = std::pow(innovation / std::hypot(sigma, sigma_), 2);
+    way_distance2_ += kDistanceGain * (std::min(distance2, kMaxDistance2) - way_distance2_);
+  }
   const double distance = judge(innovation, sigma, witness);
   // Huber's weight of a residual d is kHuber / d, so the variance grows by d / kHuber; beyond
   // kDoubt it grows by d / kDoubt once more: an outlier then moves the state less the farther it
@@ -70,7 +77,7 @@ bool ScaleFilter::update(double log_scale, double sigma, ScaleWitness witness) {
   }
   record(witness).since_s = 0.0;
   log_scale_ += gain * innovation;
-  sigma_ *= std::sqrt(1.0 - gain);
+  sigma_ = std::max(sigma_ * std::sqrt(1.0 - gain), is_first ? kFirstSigma : 0.0);
   return distance < kDoubt;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -48,6 +49,10 @@ class ScaleFilter {
   [[nodiscard]] bool is_initialized() const { return is_initialized_; }
   [[nodiscard]] double log_scale() const { return log_scale_; }
   [[nodiscard]] double sigma() const { return sigma_; }
+  /// Between ways a map may drift by more than it mostly does: so many times `sigma` is the error.
+  [[nodiscard]] double way_sigma_factor() const {
+    return std::sqrt(std::max(1.0, way_distance2_));
+  }
 
  private:
   struct Record {
@@ -70,6 +75,7 @@ class ScaleFilter {
   /// the filter is slow. By ways alone, where no road says otherwise.
   double trend_ = 0.0;
   std::array<Record, 2> records_;  ///< by witness
+  double way_distance2_ = 1.0;     ///< mean square of ways' distances, standard deviations
 };
 
 }  // namespace stemvo
