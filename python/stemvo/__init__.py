@@ -5,12 +5,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from . import _core
-from ._core import (AdjustedKeyframe, AdjustedMap, Camera, CameraSigma, FrameView, Keyframe, MapChanges, Options, Recording, Result,
-                    __version__, align, dense_errors, evaluate, pair_by_time, read_recording, read_trajectory, rescale_steps, segment_errors)
+from ._core import (AdjustedKeyframe, AdjustedMap, Camera, CameraSigma, Channel, ChannelOdometry, FrameView, Keyframe, MapChanges, Options,
+                    PatchTracker, Recording, Result, SeenImage, Stem, __version__, align, dense_errors, evaluate, pair_by_time, read_recording, read_trajectory, rescale_steps, segment_errors)
 from .results import Kept, plot, to_dataframe
 
 __all__ = [
-    "AdjustedKeyframe", "AdjustedMap", "Camera", "CameraSigma", "FrameView", "Kept", "Keyframe", "MapChanges", "Odometry", "Options", "Recording", "Result", "__version__", "align", "dense_errors", "evaluate",
+    "AdjustedKeyframe", "AdjustedMap", "Camera", "CameraSigma", "Channel", "ChannelOdometry", "FrameView", "Kept", "Keyframe", "MapChanges", "Odometry", "Options",
+    "PatchTracker", "Recording", "Result", "SeenImage", "Stem", "__version__", "align", "dense_errors", "evaluate",
     "pair_by_time", "plot", "read_recording", "read_trajectory", "rescale_steps", "segment_errors", "to_dataframe",
 ]
 

@@ -39,5 +39,5 @@ PYTHONPATH=$SOURCE/tests/python python3 -c "import documented
 print(next(block.text for block in documented.blocks('python') if 'read_recording' in block.text))" >"$ROOT/root/stemvo/quick_start.py"
 in_clone venv/bin/python quick_start.py
 in_clone make lab
-in_clone "$(grep -P '^build/lab/bin/stemvo-lab search ' "$SOURCE/README.md" | sed 's|KITTI|drive|; s|stems/NAME.onnx|default|')"
+in_clone "$(grep -P '^build/lab/bin/stemvo-lab search ' "$SOURCE/README.md")"
 echo "==> $RELEASE: done"

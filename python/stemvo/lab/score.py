@@ -10,7 +10,6 @@ import pathlib
 import numpy as np
 
 import stemvo
-from stemvo import _core
 from stemvo.lab.runs import image_sizes
 
 MIN_SIDE_PX = 16  # of a channel: room for the windows of a tracker and for motion
@@ -73,7 +72,7 @@ class _Filter:
     """One filter's odometry, and what is counted after the first frame."""
 
     def __init__(self, recording, settings):
-        self.odometry = _core.ChannelOdometry(recording.camera, settings)
+        self.odometry = stemvo.ChannelOdometry(recording.camera, settings)
         self.frames, self.measured, self.inliers, self.matches = 0, 0, 0, 0
 
     def process(self, channel, image, time):
@@ -115,7 +114,7 @@ def errors_of(trajectory, truth):
 
 @functools.lru_cache(2)
 def _stem(model, options):
-    return _core.Stem(stemvo.Options(dict(options) | {"stem.model": model, "stem.filter": -1}))
+    return stemvo.Stem(stemvo.Options(dict(options) | {"stem.model": model, "stem.filter": -1}))
 
 
 class _Run:

@@ -52,7 +52,7 @@ def layer_of(model, config, overrides, is_baseline=False, **more):
         more["stem.sampling_px"] = stride // 2  # shifted passes of a coarse layer cost more than more of them tell
     values = {key: value for key, value in values.items() if key not in dropped} | more
     settings = stemvo.Options(values | {"threads": 1})
-    stem = _core.Stem(stemvo.Options(values | {"stem.model": model}))
+    stem = stemvo.Stem(stemvo.Options(values | {"stem.model": model}))
     return Layer(model, pathlib.Path(model).stem if model.endswith(".onnx") else model, hashlib.sha256(_core.model_bytes(model)).hexdigest()[:16], stem.layer or "input",
                  stem.num_filters, tuple(values.items()), values.get("features.method", "patch"),
                  hashlib.sha256((program_hash() + str(settings)).encode()).hexdigest()[:16], is_baseline)

@@ -10,7 +10,7 @@ import click
 import cv2
 import numpy as np
 
-from .._core import PatchTracker, read_recording
+from stemvo import PatchTracker, read_recording
 from . import pairs
 
 NEAR, FAR = 2.0, 6.0  # input px that a start is off by at most, along x and y

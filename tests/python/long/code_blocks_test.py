@@ -59,6 +59,7 @@ IN_PLACE_OF = [
     (r"--controls gray,log,census", "--controls gray"),
     (r"\{street,walk\}\{1,2,3\} --objective landing", "{street,walk}1 --objective landing --steps 2"),
     (r"(stemvo-lab robustness (?!.*--kinds).*?) --out", r"\1 --kinds none,rain --out"),
+    (r"\bbuild/demo/data/", "KITTI/"),
     (r"--calib refined.txt", "--calib KITTI/sequences/00/calib.txt"),
     (r"( --model stems/(efficientnetv2b0|mobilenet025|resnet18)\.onnx){3}", ""),
     (r"--model (M\b|stems/efficientnetv2b0.onnx)", "--model default"),
