@@ -92,6 +92,7 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   const Observations now = current_points(frame.matches, localized.inlier_mask);
   if (!is_initializing_) {
     timer.emplace(Stage::kLocalization);
+    renew_stand(now);
     still_px = stationary_flow_px(moving_view_.points, now, min_flow_px(), options_.min_inliers);
     if (!still_px) {
       keep_stand();
@@ -105,6 +106,11 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
     start = turn ? nearer_pose(start, predict(turn), seen, camera()) : start;
   }
   const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
+  // What passes hides the landmarks; more of the rest stands than agrees with another pose.
+  if (!still_px && num_standing(frame, now) >
+                       std::max(found ? found->num_inliers : 0, options_.min_inliers)) {
+    return FrameState::kStationary;
+  }
   if (found.has_value()) {
     const Rigid3 of_world =
         pose_without_thing(frame, seen, found->world_from_camera, localized.inlier_mask);

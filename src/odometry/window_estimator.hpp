@@ -137,7 +137,9 @@ class WindowEstimator final : public Estimator {
 
   // A camera that stood moves off.
   static constexpr double kHidden_s = 3.0;  ///< it is believed to stand where things hide the world
+  void renew_stand(const Observations& now);
   void keep_stand();
+  [[nodiscard]] int num_standing(const Frame& frame, const Observations& now) const;
   [[nodiscard]] const Keyframe* standing_keyframe(const Frame& frame,
                                                   const Observations& now) const;
   [[nodiscard]] std::optional<double> length_since_stand(const Observations& now,

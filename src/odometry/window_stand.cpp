@@ -71,6 +71,14 @@ std::optional<double> most_likely(std::vector<ToldLength> lengths) {
 
 }  // namespace
 
+/// Who passes has hidden what was seen when the stand began: what was seen last takes its place.
+void WindowEstimator::renew_stand(const Observations& now) {
+  const auto num_common = std::ssize(common_points(moving_view_.points, now).cur_uv);
+  if (stood_ && !stand_.points.empty() && num_common < options_.min_inliers) {
+    moving_view_.points = stand_.points;
+  }
+}
+
 /// The tracks that began while the camera stood are in no other keyframe. One that stands again at
 /// the same place has its keyframe there anew: a window of one place would know no depth.
 void WindowEstimator::keep_stand() {
@@ -85,6 +93,19 @@ void WindowEstimator::keep_stand() {
   }
   append(std::move(keyframe));
   history_.add_keyframe(stand_.frame);
+}
+
+/// Tracks that are where the stand's keyframe has them.
+int WindowEstimator::num_standing(const Frame& frame, const Observations& now) const {
+  const auto stood = std::ranges::find(window_.keyframes, stand_.frame, &Keyframe::frame);
+  if (!stood_ || is_initializing_ || stood == window_.keyframes.end() ||
+      frame.time_s - times_s_[slot(stood->frame)] > kHidden_s) {
+    return 0;
+  }
+  return static_cast<int>(std::ranges::count_if(now, [&](const Observation& point) {
+    const Observation* before = find_point(stood->points, point.track_id);
+    return before != nullptr && (point.uv - before->uv).norm() < min_flow_px();
+  }));
 }
 
 /// Null: the frame is not to be measured against one.
