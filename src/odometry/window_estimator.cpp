@@ -275,13 +275,20 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
     is_initializing_ = false;
     return told ? FrameState::kTracking : FrameState::kInitializing;
   }
-  // Until there is a first map, the position is held; later the camera goes on as fast as it was.
-  const bool goes_on = !window_.keyframes.empty() && is_tracking;
-  world_from_camera_ =
-      Rigid3(guess.rotation, goes_on ? guess.translation : world_from_camera_.translation);
-  const bool is_still =
-      motion.state == FrameState::kStationary || motion.state == FrameState::kRotating;
-  still_s_ += is_still ? interval_s_ : 0.0;
+  // Until there is a first map, the position is held; later the camera goes on as it was seen to.
+  const bool is_still = motion.state == FrameState::kStationary ||
+                        (motion.state == FrameState::kRotating && window_.keyframes.empty());
+  double moving_s = is_still ? 0.0 : interval_s_;
+  Eigen::Vector3d position = world_from_camera_.translation;
+  if (!window_.keyframes.empty() && is_tracking) {
+    position = guess.translation;
+  } else if (!window_.keyframes.empty() && !is_still) {
+    position = predict().translation;
+    moving_s *= std::min(1.0, (position - world_from_camera_.translation).norm() /
+                                  (speed_ * interval_s_));
+  }
+  still_s_ += interval_s_ - moving_s;
+  world_from_camera_ = Rigid3(guess.rotation, position);
   return is_tracking ? FrameState::kInitializing : motion.state;
 }
 

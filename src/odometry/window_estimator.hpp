@@ -224,7 +224,7 @@ class WindowEstimator final : public Estimator {
   std::optional<double> metric_sigma_;  ///< of the last frame's scale, where that is in metres
   std::optional<Similarity3> moved_;    ///< the world, on the frame in work: new from old
   int recognized_frame_ = -1;           ///< by the frame in work
-  double still_s_ = 0.0;                ///< since the initializer's reference: stationary, rotating
+  double still_s_ = 0.0;                ///< since the initializer's reference: as far as it stood
   int keyframes_since_refinement_ = 0;
 };
 

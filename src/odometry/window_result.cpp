@@ -100,9 +100,10 @@ void WindowEstimator::describe(const Frame& frame, FrameResult& result) {
   result.world_from_camera = world_from_camera_;
   result.is_scale_new = is_localized(frame) && result.state == FrameState::kInitializing;
   scale_.report(result);
-  const bool has_position = !is_initializing_ || (result.state != FrameState::kInitializing &&
-                                                  result.state != FrameState::kLowParallax);
-  result.is_measured = is_measured(result.state) && has_position;
+  const bool is_guessed =
+      result.state == FrameState::kInitializing || result.state == FrameState::kLowParallax ||
+      (result.state == FrameState::kRotating && !window_.keyframes.empty());
+  result.is_measured = is_measured(result.state) && !(is_initializing_ && is_guessed);
   result.map_id = map_ids_.now();
   result.map_from_world = mapper_.map_from_world();
   result.recognized_frame = recognized_frame_;
@@ -199,7 +200,8 @@ void WindowEstimator::remember(const Frame& frame, FrameState state) {
     }
     const double speed = motion_.speed();
     speed_ = speed > 0.0 && state == FrameState::kTracking ? speed : speed_;
-  } else if (!is_measured(state)) {
+  } else if (!has_pose && state != FrameState::kStationary &&
+             state != FrameState::kInitializing) {
     motion_.lost(interval_s_);
   }
   if (frame.has_image()) {
