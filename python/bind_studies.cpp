@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Parts of an odometry, for studies that run many channels over one image.
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -16,6 +19,7 @@
 #include "arrays.hpp"
 #include "frames.hpp"
 #include "odometry/channel_odometry.hpp"
+#include "odometry/check_frame.hpp"
 #include "options.hpp"
 #include "stem/model.hpp"
 #include "stem/stem.hpp"
@@ -31,8 +35,22 @@ using FloatArgument = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::de
 using Channels = std::vector<Channel>;
 
 Channel channel_of(const FloatArgument& values, double scale, double offset) {
+  constexpr int kMinSide = 16;
   const cv::Mat view(static_cast<int>(values.shape(0)), static_cast<int>(values.shape(1)), CV_32F,
                      const_cast<float*>(values.data()));
+  if (std::min(view.rows, view.cols) < kMinSide || !cv::checkRange(view)) {
+    throw nb::value_error(fmt::format("values: expected finite numbers, at least {0}x{0}, found "
+                                      "{1}x{2}{3}",
+                                      kMinSide, view.rows, view.cols,
+                                      view.empty() || cv::checkRange(view) ? "" : ", not finite")
+                              .c_str());
+  }
+  if (!(scale > 0.0 && std::isfinite(scale) && std::isfinite(offset))) {
+    throw nb::value_error(
+        fmt::format("scale, offset: expected a scale above 0 and a number, found {}, {}", scale,
+                    offset)
+            .c_str());
+  }
   return {view.clone(), {{scale, scale}, {offset, offset}}};
 }
 
@@ -94,8 +112,10 @@ class PythonChannelOdometry {
     config.threads = 1;
     has_map_ = config.odometry.mode == OdometryMode::kMap;
     const FrameSource* frames = frames_of(camera);
-    odometry_.emplace(config, frames != nullptr ? frames->camera : nb::cast<Camera>(camera),
-                      frames != nullptr ? frames->mask : cv::Mat());
+    const Camera& seen_by = frames != nullptr ? frames->camera : nb::cast<Camera>(camera);
+    value_or_raise(check_camera(seen_by));
+    size_ = {seen_by.width_px, seen_by.height_px};
+    odometry_.emplace(config, seen_by, frames != nullptr ? frames->mask : cv::Mat());
   }
 
   FrameResult process(const Channel* channel,
@@ -107,7 +127,13 @@ class PythonChannelOdometry {
               .c_str());
     }
     const cv::Mat pixels = image ? value_or_raise(view_of(*image, "image")).pixels : cv::Mat();
+    if (image && pixels.size() != size_) {
+      throw nb::value_error(fmt::format("image: expected {}x{} pixels, found {}x{}", size_.width,
+                                        size_.height, pixels.cols, pixels.rows)
+                                .c_str());
+    }
     const nb::gil_scoped_release release;
+    const std::lock_guard lock(turn_);
     last_time_s_ = timestamp;
     Frame frame;
     frame.time_s = timestamp;
@@ -123,6 +149,8 @@ class PythonChannelOdometry {
 
  private:
   bool has_map_ = true;
+  cv::Size size_;
+  std::mutex turn_;  ///< of process()
   std::optional<ChannelOdometry> odometry_;
   double last_time_s_ = -std::numeric_limits<double>::infinity();
 };

@@ -17,8 +17,13 @@ constexpr int kMaxGuessed = 10;
 constexpr double kNewLogScale = 0.1;  ///< a unit that changes by more is another one
 constexpr double kTrack_px = 0.7;     ///< error of a track over the window
 /// Road and ways that differ by more, and by so many sigmas, are not both right.
-constexpr double kContradiction = 0.1;
+constexpr double kContradiction = 0.04;
 constexpr double kContradictionSigmas = 3.0;
+/// Ways that have ended so long ago leave the scale to a road that is believed.
+constexpr double kSilent_s = 2.0;
+/// The map does not drift as fast for longer; and a road sees most of it.
+constexpr double kMaxAge_s = 10.0;
+constexpr double kMaxAgeBesideRoad_s = 0.8;
 /// Where a way says what the road's scale is, the road is searched for as far around it.
 constexpr double kSearchSigma = 0.3;
 
@@ -48,6 +53,7 @@ void MetricScale::restart(const RoadImage* road, double time_s, bool has_scale) 
   }
   is_road_believed_ = false;
   is_way_measured_ = false;
+  apart_ = 0.0;
   state_ = ScaleState::kNone;
   if (road_.has_value()) {
     road_->restart();
@@ -56,12 +62,15 @@ void MetricScale::restart(const RoadImage* road, double time_s, bool has_scale) 
 }
 
 double MetricScale::contradiction() const {
-  if (!is_road_believed_ || !is_way_measured_) {
-    return 0.0;
-  }
   const double apart = std::abs(filter_.log_scale() - road_filter_.log_scale());
   const double sigma = std::hypot(filter_.sigma(), road_->sigma(road_filter_));
   return apart > std::max(kContradiction, kContradictionSigmas * sigma) ? apart : 0.0;
+}
+
+double MetricScale::way_sigma() const {
+  const double longest_s = is_road_believed_ && apart_ == 0.0 ? kMaxAgeBesideRoad_s : kMaxAge_s;
+  const double drift = kMapDrift * std::min(ways_.age_s(last_time_s_), longest_s);
+  return std::hypot(filter_.way_sigma_factor() * filter_.sigma(), drift, apart_);
 }
 
 bool MetricScale::measure_road(const RoadImage& road,
@@ -75,11 +84,19 @@ bool MetricScale::measure_road(const RoadImage& road,
   });
   is_road_believed_ = estimate.is_believed;
   reason_ = estimate.reason;
+  if (is_way_measured_ && estimate.is_believed && ways_.silent_s(last_time_s_) > kSilent_s) {
+    is_way_measured_ = false;
+    apart_ = 0.0;
+    filter_ = road_filter_;
+  }
   if (!has_ways_) {
     filter_ = road_filter_;
     return estimate.is_measured;
   }
-  if (contradiction() > 0.0) {
+  if (is_way_measured_ && estimate.is_measured) {
+    apart_ = contradiction();
+  }
+  if (apart_ > 0.0) {
     reason_ = kRoadContradicted;
     return false;
   }
@@ -113,19 +130,14 @@ double MetricScale::measure(const RoadImage* road,
                                                    : ScaleState::kNone;
   ++num_frames_;
   const bool is_proven = is_scale_proven_ || is_road_believed_ || is_way_measured_;
-  is_scale_new_ = is_proven && !is_scale_proven_ && num_frames_ > kMaxGuessed &&
+  is_scale_new_ = is_proven && num_frames_ > kMaxGuessed &&
                   std::abs(filter_.log_scale()) > kNewLogScale;
   is_scale_proven_ = is_proven;
   if (!filter_.is_initialized() || (!is_proven && num_frames_ > kMaxGuessed)) {
     return 1.0;
   }
   const double metres_per_unit = std::exp(filter_.log_scale());
-  filter_.shift(-std::log(metres_per_unit));
-  road_filter_.shift(-std::log(metres_per_unit));
-  ways_.rescale(metres_per_unit);
-  if (road_.has_value()) {
-    road_->rescale(metres_per_unit);
-  }
+  rescale(metres_per_unit);
   return metres_per_unit;
 }
 

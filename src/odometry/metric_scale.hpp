@@ -53,6 +53,15 @@ class MetricScale {
                                double time_s,
                                double pixel_units,
                                const std::vector<RoadLandmark>& landmarks = {});
+  /// The map was multiplied by `factor` (new units = factor * old units).
+  void rescale(double factor) {
+    filter_.shift(-std::log(factor));
+    road_filter_.shift(-std::log(factor));
+    ways_.rescale(factor);
+    if (road_.has_value()) {
+      road_->rescale(factor);
+    }
+  }
   /// The next motion will not tell how far the camera went since the last one.
   void cut_path(double time_s) { ways_.restart(time_s); }
   /// A frame on which nothing can be measured: the last scale is kept, its sigma grows.
@@ -81,7 +90,7 @@ class MetricScale {
     result.road_reason = reason_;
     result.is_scale_new = result.is_scale_new || is_scale_new_;
     if (is_enabled()) {
-      result.scale_sigma = is_way_measured_ ? std::hypot(filter_.way_sigma_factor() * filter_.sigma(), contradiction())
+      result.scale_sigma = is_way_measured_    ? way_sigma()
                            : is_road_believed_ ? road_->sigma(filter_)
                                                : ScaleFilter::kUnknownSigma;
     }
@@ -94,12 +103,15 @@ class MetricScale {
                     const std::vector<RoadLandmark>& landmarks);
   /// How far apart road and ways are, if they contradict each other; else 0.
   [[nodiscard]] double contradiction() const;
+  /// Of the scale that ways measured.
+  [[nodiscard]] double way_sigma() const;
 
   ScaleFilter filter_;
   /// What the road says by itself: where a way said what to look for, it would be found.
   ScaleFilter road_filter_;
   std::optional<RoadScale> road_;
   WayScale ways_;
+  double apart_ = 0.0;  ///< contradiction() when the road was measured last
   double last_time_s_ = 0.0;  ///< of the frame before
   bool has_ways_ = false;
   bool is_road_believed_ = false;

@@ -172,12 +172,14 @@ struct OdometryHandle::Impl {
   }
   [[nodiscard]] Status reset() {
     const std::lock_guard lock(turn);
-    const bool is_reset = loops.reset();
+    if (!loops.reset()) {
+      return fail("reset: expected none after finish(), found one");
+    }
     check.restart();
     log.restart();
     const std::lock_guard ways_lock(ways_mutex);
     ways.restart();
-    return is_reset ? Status() : ended();
+    return {};
   }
 
   [[nodiscard]] Expected<WholeMap> adjusted_map(const std::string& asked,

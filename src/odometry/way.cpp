@@ -16,6 +16,8 @@ namespace {
 
 /// Between speeds farther apart than this the camera may have stood and gone again.
 constexpr double kMaxGap_s = 1.5;
+/// More is what sensors send that have no answer (65535), not what carries a camera.
+constexpr double kMaxSpeed = 1000.0;
 
 Status check_source(ScaleSource source) {
   return source == ScaleSource::kConstantSpeed
@@ -53,8 +55,8 @@ Status WayInput::add_speed(double time_s, double metres_per_s, std::optional<dou
   STEMVO_TRY(check_source(source_));
   const auto last_s = last_speed_ ? std::optional(last_speed_->time_s) : std::nullopt;
   STEMVO_TRY(check_time("speed", time_s, last_s, "speed"));
-  if (!std::isfinite(metres_per_s)) {
-    return fail(fmt::format("speed: expected a number of m/s, found {}", metres_per_s));
+  if (!(std::abs(metres_per_s) <= kMaxSpeed)) {
+    return fail(fmt::format("speed: expected at most {} m/s, found {}", kMaxSpeed, metres_per_s));
   }
   const double sigma = given_sigma.value_or(usual_speed_sigma(metres_per_s));
   STEMVO_TRY(check_sigma("speed", sigma));
@@ -81,8 +83,9 @@ Status WayInput::add_distance(double from_s, double to_s, double metres, double 
     return fail(fmt::format("distance: expected a time after its beginning, {} s, found {} s",
                             from_s, to_s));
   }
-  if (!(metres >= 0.0 && std::isfinite(metres))) {
-    return fail(fmt::format("distance: expected at least 0 m, found {}", metres));
+  if (!(metres >= 0.0 && metres <= kMaxSpeed * (to_s - from_s))) {
+    return fail(fmt::format("distance: expected 0 m to {} m a second, found {} m in {} s",
+                            kMaxSpeed, metres, to_s - from_s));
   }
   last_to_s_ = to_s;
   ways_.push_back({from_s, to_s, metres, sigma, Way::Kind::kDistance});
@@ -118,7 +121,7 @@ void WayScale::move(const Rigid3& cur_from_prev, double time_s, double pixel_uni
   }
 }
 
-bool WayScale::measure(Queue& queue, ScaleFilter& filter) const {
+bool WayScale::measure(Queue& queue, ScaleFilter& filter) {
   auto& [waiting, joined] = queue;
   // Ways that have ended are one.
   for (; !waiting.empty() && waiting.front().to_s <= stations_.back().time_s; waiting.pop_front()) {
@@ -143,9 +146,12 @@ bool WayScale::measure(Queue& queue, ScaleFilter& filter) const {
         way.metres > kMinWaySigmas * way.sigma_m)) {
     return false;  // goes on
   }
-  const double sigma =
-      std::hypot(way.sigma_m / way.metres, std::sqrt(2.0) * kPlace_px * pixel_units_ / units);
+  const double drift = kMapDrift * (stations_.back().time_s - 0.5 * (way.from_s + way.to_s));
+  const double sigma = std::hypot(way.sigma_m / way.metres, drift,
+                                  std::sqrt(2.0) * kPlace_px * pixel_units_ / units);
   const bool is_believed = filter.update(std::log(way.metres / units), sigma, ScaleWitness::kWay);
+  last_from_s_ = way.from_s;
+  last_to_s_ = way.to_s;
   joined.reset();
   return is_believed;
 }

@@ -13,6 +13,10 @@
 
 namespace stemvo {
 
+/// Drift of log(metres per unit) in a second, steadily, since the middle of a way: turns and starts
+/// of real clips show so much over a second or two.
+inline constexpr double kMapDrift = 0.025;
+
 /// A length of the camera's path that somebody else measured.
 struct Way {
   enum class Kind {
@@ -89,6 +93,9 @@ class WayScale {
       }
     }
   }
+  /// Since the last way that was measured: its middle, its end.
+  [[nodiscard]] double age_s(double now_s) const { return now_s - 0.5 * (last_from_s_ + last_to_s_); }
+  [[nodiscard]] double silent_s(double now_s) const { return now_s - last_to_s_; }
   /// Gives the filter what the ways that have ended tell. Returns whether one of them was believed.
   bool measure(ScaleFilter& filter);
 
@@ -112,13 +119,15 @@ class WayScale {
     const double share = (time_s - before.time_s) / (after->time_s - before.time_s);
     return before.length + share * (after->length - before.length);
   }
-  [[nodiscard]] bool measure(Queue& queue, ScaleFilter& filter) const;
+  [[nodiscard]] bool measure(Queue& queue, ScaleFilter& filter);
   /// By ways, or parts of ways, that are inside the path.
   void guess(ScaleFilter& filter) const;
 
   std::deque<Station> stations_;
   Rigid3 now_from_station_;
   double pixel_units_ = 0.0;
+  double last_from_s_ = 0.0;  ///< of the last way that was measured
+  double last_to_s_ = 0.0;
   std::array<Queue, 2> queues_;  ///< between speeds, distances
   std::optional<Way> held_;
 };

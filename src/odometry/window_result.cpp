@@ -78,6 +78,8 @@ void WindowEstimator::take_in(const Recognition& recognition) {
     const Similarity3& moved = *recognition.moved;
     move(window_, moved);
     history_.rescale(moved.scale);
+    scale_.rescale(moved.scale);
+    uncertainty_.rescale(moved.scale);
     calibration_.restart();
     for (Rigid3* pose : {&world_from_camera_, &view_.world_from_camera,
                          &moving_view_.world_from_camera, &last_.world_from_camera, &road_pose_}) {

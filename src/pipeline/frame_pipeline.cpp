@@ -33,6 +33,10 @@ Status add_speeds(const RunRequest& request, const FrameSource& sequence, Beside
     }
   }
   beside.ways = input.take(std::numeric_limits<double>::infinity());
+  if (beside.ways.empty()) {
+    return fail(fmt::format("{}: expected speeds at most 1.5 s from the next, found none",
+                            request.speeds->string()));
+  }
   beside.note += fmt::format(", {} speeds", rows.size());
   add_line(beside.unit_notes, found.note);
   beside.spans.push_back({"--speed", rows.front().time_s, rows.back().time_s});

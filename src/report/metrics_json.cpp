@@ -253,7 +253,7 @@ std::string warn_of_road(const MetricsReport& report) {
                         "the path is in units, not metres"
          : share < kFewBelieved
              ? fmt::format(
-                   "scale: a road was believed on {:.1f} % of the frames only; the others' "
+                   "scale: a road was believed on {:.1f} % of the frames only, and may be none; "
                    "lengths are a guess (scale_state in frames.csv)",
                    100.0 * share)
          : report.road_contradicted_fraction > kFewContradicted

@@ -154,9 +154,11 @@ struct BesideARoad {
 
 /// A drive whose speed is given, beside a road whose height is said to be `said` times the true
 /// one. Landmarks lie `ratio` times as far below the camera as the road does.
-BesideARoad scale_beside_a_road(double said, double ratio) {
-  constexpr int kNumFrames = 30;
-  const RoadDrive drive(kNumFrames);
+BesideARoad scale_beside_a_road(double said,
+                                double ratio,
+                                int num_frames = 30,
+                                int num_speeds = 30) {
+  const RoadDrive drive(num_frames);
   Options config = metric_config();
   const double height_m = config.scale.camera_height_m;
   config.scale.camera_height_m = said * height_m;
@@ -164,8 +166,8 @@ BesideARoad scale_beside_a_road(double said, double ratio) {
   WayInput input{ScaleSource::kCameraHeight};
   double units_per_m = 1.0;
   scale.restart(drive.road_image(0, true).get(), 0.0);
-  for (int i = 1; i < kNumFrames; ++i) {
-    EXPECT_TRUE(input.add_speed(0.1 * (i - 0.5), 10.0 * kStep_m, 0.4));
+  for (int i = 1; i < num_frames; ++i) {
+    EXPECT_TRUE(i >= num_speeds || input.add_speed(0.1 * (i - 0.5), 10.0 * kStep_m, 0.4));
     scale.add(input.take(0.1 * i));
     std::vector<RoadLandmark> landmarks;
     const double below = ratio * height_m * units_per_m;
@@ -194,6 +196,9 @@ TEST(MetricScale, ASpeedWinsOverARoadThatContradictsItAndItIsSaid) {
     EXPECT_NEAR(apart.metres_per_m, 1.0, 0.03) << said;
     EXPECT_NEAR(apart.last.scale_sigma.value_or(0.0), std::abs(std::log(said)), 0.05) << said;
   }
+  const BesideARoad after = scale_beside_a_road(1.25, 1.0, 45, 18);
+  EXPECT_EQ(after.last.road_reason, "") << "the speeds have ended";
+  EXPECT_NEAR(after.metres_per_m, 1.25, 0.03);
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes,

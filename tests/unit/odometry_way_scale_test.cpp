@@ -93,6 +93,43 @@ TEST(WayScale, WhereAMapDriftsFastBetweenWaysTheSigmaSaysIt) {
   EXPECT_LE(drive.num_far_off, 45) << "of 390; without that, nine of ten";
 }
 
+// A speed of a second ago says nothing of the drift since then.
+TEST(WayScale, LateSpeedsLeaveTheScaleLessSure) {
+  PlantedDrive drive{.drift = 0.004};
+  const auto give = speeds(drive, 0.02);
+  drive.run(400, [&](double now_s) {
+    if (now_s > 1.0) {
+      give(now_s - 1.0);
+    }
+  });
+  EXPECT_GT(drive.largest_step_error, 0.05);
+  EXPECT_LE(drive.num_far_off, 4);
+}
+
+TEST(WayScale, AMapThatTakesAnothersUnitKeepsMetres) {
+  MetricScale scale{Options()};
+  WayInput input{ScaleSource::kNone};
+  scale.restart(nullptr, 0.0);
+  double units_per_m = 0.3;
+  FrameResult result;
+  for (int i = 1; i < 60; ++i) {
+    if (i == 40) {
+      scale.rescale(0.02);
+      units_per_m *= 0.02;
+    }
+    ASSERT_TRUE(input.add_speed(0.1 * i, 8.0, 0.1));
+    scale.add(input.take(0.1 * i));
+    const Rigid3 step(Eigen::Quaterniond::Identity(), {0.0, 0.0, -0.8 * units_per_m});
+    units_per_m *= scale.measure(nullptr, step, 0.1 * i, 0.01 * units_per_m);
+    result = {};
+    scale.report(result);
+    EXPECT_EQ(result.is_scale_new, i == 40) << i;
+    if (i >= 20) {
+      EXPECT_NEAR(units_per_m, 1.0, 0.01) << i;
+    }
+  }
+}
+
 TEST(WayScale, ACameraThatStandsTellsNothing) {
   PlantedDrive drive;
   drive.speed = [](double now_s) {  // from 20 to 50 s
@@ -171,7 +208,7 @@ TEST(WayInput, RefusesWhatIsNoMeasurementAndSaysWhy) {
     return message_of(ways.add_speed(time_s, metres_per_s, sigma));
   };
   EXPECT_THAT(speed(kNan, 1.0, 0.1), HasSubstr("speed: expected a finite number of seconds"));
-  EXPECT_THAT(speed(0.0, kNan, 0.1), HasSubstr("expected a number of m/s, found nan"));
+  EXPECT_THAT(speed(0.0, kNan, 0.1), HasSubstr("expected at most 1000 m/s, found nan"));
   EXPECT_THAT(speed(0.0, 1.0, 0.0), HasSubstr("expected a sigma above 0, found 0"));
   EXPECT_THAT(speed(0.0, 1.0, kNan), HasSubstr("expected a sigma above 0, found nan"));
   EXPECT_EQ(speed(1.0, -1.0, 0.1), "no error");
@@ -184,7 +221,7 @@ TEST(WayInput, RefusesWhatIsNoMeasurementAndSaysWhy) {
     return message_of(ways.add_distance(from_s, to_s, metres, sigma));
   };
   EXPECT_THAT(distance(2.0, 1.0, 1.0, 0.1), HasSubstr("its beginning, 2 s, found 1 s"));
-  EXPECT_THAT(distance(1.0, 2.0, -1.0, 0.1), HasSubstr("expected at least 0 m, found -1"));
+  EXPECT_THAT(distance(1.0, 2.0, -1.0, 0.1), HasSubstr("expected 0 m to 1000 m a second, found -1 m in 1 s"));
   EXPECT_THAT(distance(1.0, 2.0, 1.0, -0.1), HasSubstr("expected a sigma above 0, found -0.1"));
   EXPECT_EQ(distance(1.0, 2.0, 1.0, 0.1), "no error");
   EXPECT_THAT(distance(0.0, 2.0, 1.0, 0.1), HasSubstr("after the last distance's, 2 s, found 2 s"));
