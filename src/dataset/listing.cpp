@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/listing.hpp"
 
-#include <algorithm>
 #include <cctype>
 #include <system_error>
 

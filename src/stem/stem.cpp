@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "stem/stem.hpp"
 
-#include <algorithm>
 #include <map>
 #include <numeric>
 
