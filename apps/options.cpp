@@ -77,11 +77,11 @@ void add_config_options(CLI::App& command, ConfigArguments& arguments) {
       });
 }
 
-Expected<Config> read_config(const ConfigArguments& arguments, const Config& base) {
-  Config config = base;
+Expected<Config> read_config(const ConfigArguments& arguments) {
+  Config config;
   if (!arguments.file.empty()) {
     STEMVO_TRY_GET(const auto file, find_config(arguments.file));
-    STEMVO_TRY_GET(config, load_config(file, base));
+    STEMVO_TRY_GET(config, load_config(file));
   }
   std::map<std::string, std::string> given;  // key -> the assignment
   for (const std::string& assignment : arguments.overrides) {

@@ -78,11 +78,6 @@ void StageRecorder::add(Stage stage, double wall_ms, double cpu_ms) {
   samples.cpu_ms += cpu_ms;
 }
 
-double StageRecorder::cpu_ms(Stage stage) const {
-  const std::lock_guard lock(mutex_);
-  return stages_[static_cast<std::size_t>(stage)].cpu_ms;
-}
-
 TimingReport StageRecorder::report() const {
   const std::lock_guard lock(mutex_);
   TimingReport report;
