@@ -112,12 +112,6 @@ CLI::Option* add_file_option(CLI::App& command,
   return command.add_option_function<std::string>(name, take, help)->type_name("FILE");
 }
 
-CLI::Option* add_out_folder(CLI::App& command,
-                            std::filesystem::path& folder,
-                            const std::string& help) {
-  return command.add_option("--out", folder, help)->required()->type_name("DIR");
-}
-
 CLI::Option* add_rate_option(CLI::App& command, std::optional<double>& rate_hz) {
   return command
       .add_option("--rate", rate_hz,

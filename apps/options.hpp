@@ -36,15 +36,8 @@ CLI::Option* add_file_option(CLI::App& command,
 template <typename Number>
 [[nodiscard]] CLI::Validator in_range(Number min, Number max);
 
-/// --out DIR, which must be given.
-CLI::Option* add_out_folder(CLI::App& command,
-                            std::filesystem::path& folder,
-                            const std::string& help = "Folder for the results; created");
-
-/// --rate HZ.
 CLI::Option* add_rate_option(CLI::App& command, std::optional<double>& rate_hz);
 
-/// --gt-tolerance S.
 void add_tolerance_option(CLI::App& command, double& tolerance_s);
 
 /// An option "A:B"; text of another form is wrong usage.
