@@ -40,9 +40,7 @@ Expected<int> render(SynthArguments& arguments) {
   if (is_interrupted()) {
     return kExitInterrupted;
   }
-  if (!status) {
-    return status.error();
-  }
+  STEMVO_TRY(status);
   const std::string& name = arguments.options.name;
   const std::string sequence = (arguments.out_dir / "sequences" / name).string();
   print(fmt::format("sequence: {}\n", sequence));

@@ -195,16 +195,13 @@ Status check_size(const cv::Size& found,
                                 found.width, found.height));
 }
 
-Expected<FrameView> add_view(FrameSource& frames,
-                             const CameraFile& camera,
-                             const fs::path& camera_file,
-                             const std::vector<std::string>& masks,
-                             std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
-  const auto made = FrameView::create(camera.camera);
-  if (!made) {
-    return fail(camera_file.string() + ": " + made.error().message);
-  }
-  const FrameView& view = *made;
+Status add_view(FrameSource& frames,
+                const CameraFile& camera,
+                const fs::path& camera_file,
+                const std::vector<std::string>& masks,
+                std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
+  STEMVO_TRY_GET(const FrameView view,
+                 named(camera_file.string(), FrameView::create(camera.camera)));
   STEMVO_TRY_GET(const auto mask, make_mask(masks, view.full_size()));
   frames.given_calibration = camera_file;
   frames.camera_height_m = camera.camera_height_m;
@@ -218,7 +215,7 @@ Expected<FrameView> add_view(FrameSource& frames,
     return read_whole(index).map(
         [&](const cv::Mat& image) { return image.empty() ? image : view.apply(image); });
   };
-  return view;
+  return {};
 }
 
 Expected<SharedKind> vote_on_images(FrameSource& frames) {

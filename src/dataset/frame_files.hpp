@@ -83,12 +83,11 @@ namespace stemvo::dataset {
                                 const std::filesystem::path& camera_file);
 /// Adds the camera file's view, mask and reader: `read_whole` gives the frames as they come, of the
 /// view's full size. Errors: those of FrameView::create, naming the camera file, and of make_mask.
-[[nodiscard]] Expected<FrameView> add_view(
-    FrameSource& frames,
-    const CameraFile& camera,
-    const std::filesystem::path& camera_file,
-    const std::vector<std::string>& masks,
-    std::function<Expected<cv::Mat>(std::size_t)> read_whole);
+[[nodiscard]] Status add_view(FrameSource& frames,
+                              const CameraFile& camera,
+                              const std::filesystem::path& camera_file,
+                              const std::vector<std::string>& masks,
+                              std::function<Expected<cv::Mat>(std::size_t)> read_whole);
 
 struct SharedKind {
   cv::Size size;

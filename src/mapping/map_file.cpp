@@ -291,8 +291,7 @@ Status write_map_file(const std::filesystem::path& file, MapFile map) {
 
 Expected<MapFile> read_map_file(const std::filesystem::path& file) {
   STEMVO_TRY_GET(const std::string bytes, read_text_file(file, kMaxMap_MB));
-  Expected<MapFile> map = unseal(bytes).and_then(parse);
-  return map ? std::move(map) : fail(fmt::format("{}: {}", file.string(), map.error().message));
+  return named(file.string(), unseal(bytes).and_then(parse));
 }
 
 std::string sealed_map(std::string_view contents) {

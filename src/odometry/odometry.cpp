@@ -282,9 +282,7 @@ Expected<FrameResult> Odometry::process(const cv::Mat& image,
   if (impl_->loops.has_thrown()) {
     impl_->loops.finish();  // throws it
   }
-  if (!status) {
-    return status.error();
-  }
+  STEMVO_TRY(status);
   return *impl_->take();
 }
 

@@ -267,16 +267,13 @@ Expected<TimedRows<TimedRow>> read_timed_rows(const fs::path& file,
       return fail_at(file, i, fail(fmt::format("expected {}, found {} words", form, count)));
     }
     std::string_view rest = line;
-    const auto time = parse_numbers(take_word(rest), 1);
-    if (!time) {
-      return fail_at(file, i, time.error());
-    }
-    if (!rows.empty() && !(time->front() > rows.back().time_s)) {
+    STEMVO_TRY_GET(const auto time, at_line(file, i, parse_numbers(take_word(rest), 1)));
+    if (!rows.empty() && !(time.front() > rows.back().time_s)) {
       return fail_at(file, i,
                      fail(fmt::format("expected a time after {} s, found {} s",
-                                      unit_s * rows.back().time_s, unit_s * time->front())));
+                                      unit_s * rows.back().time_s, unit_s * time.front())));
     }
-    rows.push_back({time->front(), std::string(rest), i});
+    rows.push_back({time.front(), std::string(rest), i});
   }
   if (rows.empty()) {
     return fail(fmt::format("{}: expected rows of {}, found none", file.string(), form));
@@ -284,15 +281,12 @@ Expected<TimedRows<TimedRow>> read_timed_rows(const fs::path& file,
   const bool is_said =
       unit_s != 1.0 && (rows.size() == 1 || usual_step(rows) * unit_s >= usual.min_step_s);
   if (!is_said) {
-    const Expected<Unit> unit = find_unit(rows, usual);
-    if (!unit) {
-      return fail(fmt::format("{}: {}", file.string(), unit.error().message));
-    }
-    if (unit->size_s != unit_s) {
+    STEMVO_TRY_GET(const Unit unit, named(file.string(), find_unit(rows, usual)));
+    if (unit.size_s != unit_s) {
       result.note =
-          fmt::format("{}: times are taken for {}, by their steps", file.string(), unit->name);
+          fmt::format("{}: times are taken for {}, by their steps", file.string(), unit.name);
     }
-    unit_s = unit->size_s;
+    unit_s = unit.size_s;
   }
   for (TimedRow& row : rows) {
     row.time_s *= unit_s;

@@ -52,6 +52,15 @@ void add_line(std::vector<std::string>& lines, std::string line);
 [[nodiscard]] Error fail_at(const std::filesystem::path& file,
                             std::size_t index,
                             const Error& error);
+/// An error of it begins with the file and the line, counted from 0; or with its `owner`.
+template <typename T>
+Expected<T> at_line(const std::filesystem::path& file, std::size_t index, Expected<T> result) {
+  return result ? std::move(result) : fail_at(file, index, result.error());
+}
+template <typename T>
+Expected<T> named(const std::string& owner, Expected<T> result) {
+  return result ? std::move(result) : fail(owner + ": " + result.error().message);
+}
 
 struct TimedRow {
   double time_s = 0.0;
