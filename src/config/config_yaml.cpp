@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <ranges>
 #include <sstream>
 
 #include <fmt/ranges.h>
@@ -221,10 +222,7 @@ std::string format(const std::string& value) {
 }
 
 std::string format(const std::vector<double>& value) {
-  std::vector<std::string> texts;
-  for (const double number : value) {
-    texts.push_back(format(number));
-  }
+  const auto texts = value | std::views::transform([](double number) { return format(number); });
   return fmt::format("[{}]", fmt::join(texts, ", "));
 }
 

@@ -10,6 +10,7 @@
 
 #include "dataset/image_names.hpp"
 #include "odometry/check_frame.hpp"
+#include "odometry/frame_view.hpp"
 #include "try.hpp"
 
 namespace stemvo::dataset {

@@ -18,7 +18,6 @@
 #include "dataset/listing.hpp"
 #include "dataset/video_stream.hpp"
 #include "io/image_file.hpp"
-#include "odometry/frame_view.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
 #include "text/text_file.hpp"
