@@ -206,7 +206,9 @@ Status add_view(FrameSource& frames,
   STEMVO_TRY_GET(const auto mask, make_mask(masks, view.full_size()));
   frames.given_calibration = camera_file;
   frames.camera_height_m = camera.camera_height_m;
-  frames.camera_from_imu = camera.camera_from_imu();
+  if (camera.body_from_camera) {
+    frames.camera_from_imu = camera.body_from_camera->rotation.inverse();
+  }
   frames.imu_from_camera_s = camera.imu_from_camera_s;
   frames.mask = view.apply_to_mask(mask);
   frames.full_size = view.full_size();

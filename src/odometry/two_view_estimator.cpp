@@ -11,7 +11,6 @@
 #include "odometry/check_frame.hpp"
 #include "odometry/robust_models.hpp"
 #include "odometry/tracks.hpp"
-#include "stemvo/two_view.hpp"
 #include "timing/stage_timer.hpp"
 #include "try.hpp"
 
@@ -177,15 +176,7 @@ Expected<TwoViewResult> estimate_two_view(std::span<const Eigen::Vector2d> prev_
   STEMVO_TRY(check_camera(camera));
   STEMVO_TRY(validate(options));
   STEMVO_TRY(check_matches(prev_uv, cur_uv));
-  MeasuredMotion motion =
-      TwoViewEstimator(options).measure({prev_uv, cur_uv}, camera, /*is_initializing=*/true);
-  return TwoViewResult{motion.state,
-                       motion.cur_from_prev,
-                       motion.model,
-                       motion.homography_ratio,
-                       motion.parallax_px,
-                       motion.is_decisive,
-                       std::move(motion.inlier_mask)};
+  return TwoViewEstimator(options).measure({prev_uv, cur_uv}, camera, /*is_initializing=*/true);
 }
 
 }  // namespace stemvo

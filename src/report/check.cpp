@@ -192,8 +192,7 @@ Expected<std::vector<ThresholdResult>> check_metrics(const CheckRequest& request
 }
 
 bool all_passed(const std::vector<ThresholdResult>& results) {
-  return std::all_of(results.begin(), results.end(),
-                     [](const ThresholdResult& r) { return r.passed; });
+  return std::ranges::all_of(results, &ThresholdResult::passed);
 }
 
 std::string format_check_table(const std::vector<ThresholdResult>& results) {
@@ -205,8 +204,7 @@ std::string format_check_table(const std::vector<ThresholdResult>& results) {
     table.add({result.key, has_problem ? "-" : shown(result), has_problem ? "-" : bound_of(result),
                result.passed ? "ok" : "FAILED"});
   }
-  const auto failed = std::count_if(results.begin(), results.end(),
-                                    [](const ThresholdResult& r) { return !r.passed; });
+  const auto failed = std::ranges::count(results, false, &ThresholdResult::passed);
   const std::string summary =
       failed == 0 ? fmt::format("all {} bounds kept\n", results.size())
                   : fmt::format("{} of {} bounds not kept\n", failed, results.size());
