@@ -106,7 +106,7 @@ void TwoViewEstimator::score_models(const PixelPairs& pairs,
   if (is_initializing) {
     fundamental = estimate_fundamental(pairs, options_, seed_);
     if (fundamental.has_value()) {
-      result.essential = essential_from_fundamental(*fundamental, camera);
+      result.essential = camera.matrix().transpose() * *fundamental * camera.matrix();
     }
   } else {
     homography_options.max_iterations = std::min(options_.max_iterations, kRecordIterations);
