@@ -2,6 +2,7 @@
 #include <clocale>
 #include <locale>
 
+#include "evaluation/trajectory.hpp"
 #include "report/data_files.hpp"
 #include "support/ply_reader.hpp"
 #include "support/run_program.hpp"
