@@ -62,16 +62,10 @@ std::string unknown_key(std::string_view section,
 int line_of(const YAML::Node& node) { return node.Mark().line + 1; }
 
 std::string_view kind_of(const YAML::Node& node) {
-  switch (node.Type()) {
-    case YAML::NodeType::Sequence:
-      return "a list";
-    case YAML::NodeType::Map:
-      return "a group of keys";
-    case YAML::NodeType::Scalar:
-      return "a value";
-    default:
-      return "nothing";
-  }
+  return node.IsSequence() ? "a list"
+         : node.IsMap()    ? "a group of keys"
+         : node.IsScalar() ? "a value"
+                           : "nothing";
 }
 
 /// Finds where documents begin: YAML::Load reads the first and leaves out others without a word,
