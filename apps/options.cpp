@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "text/text_file.hpp"
 #include "try.hpp"
 
 namespace stemvo::apps {
@@ -20,20 +21,18 @@ std::filesystem::path config_folder() {
   std::error_code code;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", code);
   const auto installed = program.parent_path().parent_path() / "share/stemvo/config";
-  return !code && std::filesystem::is_directory(installed, code)
-             ? installed
-             : std::filesystem::path(STEMVO_SOURCE_DIR) / "config";
+  return !code && is_folder(installed) ? installed
+                                       : std::filesystem::path(STEMVO_SOURCE_DIR) / "config";
 }
 
 Expected<std::filesystem::path> find_config(const std::string& given) {
-  std::error_code code;
   const std::filesystem::path file(given);
-  if (std::filesystem::exists(file, code) || file.has_parent_path()) {
+  if (is_there(file) || file.has_parent_path()) {
     return file;
   }
   for (const std::string& name : {given, given + ".yaml"}) {
     const std::filesystem::path shipped = config_folder() / name;
-    if (std::filesystem::exists(shipped, code)) {
+    if (is_there(shipped)) {
       return shipped;
     }
   }

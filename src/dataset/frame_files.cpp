@@ -79,16 +79,6 @@ double rate_of(const CameraFile& camera, const FrameSourceRequest& request, Fram
 
 }  // namespace
 
-bool is_file(const fs::path& path) {
-  std::error_code code;
-  return fs::is_regular_file(path, code);
-}
-
-bool is_folder(const fs::path& path) {
-  std::error_code code;
-  return fs::is_directory(path, code);
-}
-
 fs::path absolute_folder(const fs::path& folder) {
   std::error_code code;
   return (fs::absolute(folder, code) / "").lexically_normal().parent_path();

@@ -141,8 +141,7 @@ constexpr std::size_t kDigits = 6;  // of KITTI's %06d.png
 Expected<int> choose_camera(const fs::path& directory, const std::string& option) {
   for (const int index : {2, 0, 1, 3}) {
     const std::string name = fmt::format("image_{}", index);
-    if ((option == name || (option == "auto" && index % 2 == 0)) &&
-        dataset::is_folder(directory / name)) {
+    if ((option == name || (option == "auto" && index % 2 == 0)) && is_folder(directory / name)) {
       return index;
     }
   }
@@ -207,9 +206,8 @@ Status set_images(const fs::path& calibration, bool is_color, FrameSource& frame
 }  // namespace
 
 bool looks_like_kitti(const fs::path& folder) {
-  std::error_code code;
   constexpr const char* kNames[] = {"image_0", "image_1", "image_2", "image_3", "calib.txt"};
-  return std::ranges::any_of(kNames, [&](auto name) { return fs::exists(folder / name, code); });
+  return std::ranges::any_of(kNames, [&](auto name) { return is_there(folder / name); });
 }
 
 Expected<FrameSource> open_kitti(const fs::path& directory, const SequenceOptions& options) {

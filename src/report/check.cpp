@@ -89,8 +89,7 @@ const Json* find_metric(const Json& root, const std::string& key) {
 
 /// The result's folder stands for its metrics.json.
 std::filesystem::path metrics_file(const std::filesystem::path& given) {
-  std::error_code none;
-  return std::filesystem::is_directory(given, none) ? given / "metrics.json" : given;
+  return is_folder(given) ? given / "metrics.json" : given;
 }
 
 Expected<std::vector<ThresholdResult>> read_baseline(const std::filesystem::path& file,

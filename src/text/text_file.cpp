@@ -37,8 +37,7 @@ Error cannot(std::string_view verb, const fs::path& file, int reason) {
 
 /// Error: the place is taken by a folder, a device or another thing that a file cannot replace.
 Status check_place(const fs::path& file) {
-  std::error_code ignored;
-  if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored)) {
+  if (is_there(file) && !is_file(file)) {
     return fail(
         fmt::format("{}: expected a file to write, found {}", file.string(), kind_of(file)));
   }
@@ -47,13 +46,26 @@ Status check_place(const fs::path& file) {
 
 }  // namespace
 
-std::string_view kind_of(const fs::path& path) {
+bool is_there(const fs::path& path) {
   std::error_code ignored;
-  const fs::file_status status = fs::status(path, ignored);
-  return fs::is_regular_file(status) ? "a file"
-         : fs::is_directory(status)  ? "a folder"
-         : fs::exists(status)        ? "neither a file nor a folder"
-                                     : "nothing of that name";
+  return fs::exists(path, ignored);
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
+std::string_view kind_of(const fs::path& path) {
+  return is_file(path)     ? "a file"
+         : is_folder(path) ? "a folder"
+         : is_there(path)  ? "neither a file nor a folder"
+                           : "nothing of that name";
 }
 
 fs::path unfinished(const fs::path& file) { return fs::path(file.string() + ".unfinished"); }
@@ -61,7 +73,7 @@ fs::path unfinished(const fs::path& file) { return fs::path(file.string() + ".un
 Expected<std::string> read_text_file(const fs::path& file, int max_MB) {
   constexpr std::uintmax_t kBytesOfMB = 1000000;
   std::error_code code;
-  if (fs::exists(file, code) && !fs::is_regular_file(file, code)) {
+  if (is_there(file) && !is_file(file)) {
     return fail(fmt::format("{}: expected a file, found {}", file.string(), kind_of(file)));
   }
   const std::uintmax_t size = fs::file_size(file, code);

@@ -19,6 +19,10 @@ inline constexpr int kMaxSettings_MB = 1;
 inline constexpr int kMaxFile_MB = 256;
 inline constexpr double kNanosecond_s = 1e-9;
 
+/// What cannot be seen is not there. A file: a regular one.
+[[nodiscard]] bool is_there(const std::filesystem::path& path);
+[[nodiscard]] bool is_file(const std::filesystem::path& path);
+[[nodiscard]] bool is_folder(const std::filesystem::path& path);
 /// "a file", "a folder", "nothing of that name", ..
 [[nodiscard]] std::string_view kind_of(const std::filesystem::path& path);
 
