@@ -143,8 +143,6 @@ int image_sampling_px(TrackingResolution resolution, int sampling_px) {
 
 }  // namespace
 
-ContrastNormalization::ContrastNormalization(const StemOptions& options) : options_(options) {}
-
 bool ContrastNormalization::follow_light(const cv::Mat& values) {
   const cv::Mat before = std::exchange(light_values_, light_values(values));
   if (!limits_.are_known) {

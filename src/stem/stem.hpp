@@ -100,7 +100,7 @@ class ContrastNormalization {
  public:
   /// In `options.tracking_resolution`, kAuto and kInputZoomed stand for
   /// kInput: see choose_tracking_resolution.
-  explicit ContrastNormalization(const StemOptions& options);
+  explicit ContrastNormalization(const StemOptions& options) : options_(options) {}
   [[nodiscard]] ChannelImage apply(const Channel& channel);
 
  private:

@@ -130,11 +130,6 @@ std::optional<int> nearest_home(const RoadCurve& road, int at, const Homes& home
   return home;
 }
 
-/// Moved sideways and up on to the line of an earlier knot.
-Vec3 on_line(const RoadFrame& home, const Vec3& point) {
-  return home.position + home.forward.dot(point - home.position) * home.forward;
-}
-
 class Joiner {
  public:
   Joiner(const RoadCurve& road, const Homes& homes) : road_(road), homes_(homes) {}
@@ -190,7 +185,9 @@ class Joiner {
       const double weight = share * share * (3.0 - 2.0 * share);
       const RoadFrame& home = knot_at(own, true);
       const RoadFrame& here = road_.knot(own);
-      line.add(here.position + weight * (on_line(home, here.position) - here.position),
+      const Vec3 off = here.position - home.position;
+      const Vec3 on_line = home.position + home.forward.dot(off) * home.forward;
+      line.add(here.position + weight * (on_line - here.position),
                ((1.0 - weight) * here.up + weight * home.up).normalized());
     }
     const RoadFrame& to = knot_at(end, is_joining);

@@ -57,7 +57,7 @@ struct TimingReport {
 class StageRecorder {
  public:
   StageRecorder();
-  ~StageRecorder();
+  ~StageRecorder() { active_.store(nullptr, std::memory_order_release); }
   StageRecorder(const StageRecorder&) = delete;
   StageRecorder& operator=(const StageRecorder&) = delete;
 
