@@ -34,13 +34,6 @@ class ImageFolderTest : public ::testing::Test {
                                         more);
   }
   std::string error_of() const { return message_of(open_source(request_)); }
-  static std::string pose_lines(int count) {
-    std::string text;
-    for (int i = 0; i < count; ++i) {  // turned by 90 degrees about y, 2 m a frame along world x
-      text += fmt::format("0 0 1 {} 0 1 0 0 -1 0 0 3\n", 2 * i);
-    }
-    return text;
-  }
 
   TempFolder temp_;
   const fs::path images_ = temp_ / "my drive";
