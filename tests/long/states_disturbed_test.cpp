@@ -11,12 +11,13 @@ namespace {
 class Disturbed : public ::testing::Test {
  protected:
   /// A copy of the drive that may be changed.
-  void copy(const std::string& name, const StateDrive& drive) {
+  StateDrive copied(const std::string& name, const StateDrive& drive) {
     const fs::path from = rendered_along(name, drive);
     sequence_ = folder_.path() / "sequences" / "00";
     fs::create_directories(sequence_.parent_path());
     fs::copy(from, sequence_, fs::copy_options::recursive);
     num_frames_ = drive.world_from_camera.size();
+    return drive;
   }
   [[nodiscard]] fs::path image_file(int frame) const { return sequence_ / image_name(frame); }
   void change(int from, int to, const std::function<void(int, cv::Mat&)>& edit) const {
@@ -81,8 +82,7 @@ std::function<void(int, cv::Mat&)> darkened(double light) {
 }
 
 TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
-  const StateDrive drive = steady_drive();
-  copy("steady", drive);
+  const StateDrive drive = copied("steady", steady_drive());
   const int begin = 30;
   const int end = 34;
   change(begin, end, darkened(0.002));
@@ -102,8 +102,7 @@ TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
 
 // Five gray levels of contrast under noise of one: contrast normalization makes an image of them.
 TEST_F(Disturbed, AFewDimFramesAreFollowed) {
-  const StateDrive drive = steady_drive();
-  copy("steady", drive);
+  const StateDrive drive = copied("steady", steady_drive());
   change(30, 34, darkened(0.02));
   const StateRun result = run();
   result.expect_states(30, 60, {"tracking"});
@@ -111,8 +110,7 @@ TEST_F(Disturbed, AFewDimFramesAreFollowed) {
 }
 
 TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
-  const StateDrive drive = standing_drive();
-  copy("standing", drive);
+  const StateDrive drive = copied("standing", standing_drive());
   const Passing passing(drive.event_begin + 2, 35, kImage);
   change(drive.event_begin + 2, drive.event_end,
          [&](int i, cv::Mat& image) { passing.draw(i, image); });
@@ -128,8 +126,7 @@ TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
 }
 
 TEST_F(Disturbed, WhoStandsOpensNoMapOnWhatHidesTheWorld) {
-  const StateDrive drive = standing_drive();
-  copy("standing", drive);
+  const StateDrive drive = copied("standing", standing_drive());
   const int begin = drive.event_begin + 2;
   const Passing passing(begin, 80, kImage, {1.2, 1.0});
   change(begin, drive.event_end, [&](int i, cv::Mat& image) { passing.draw(i, image); });
@@ -144,8 +141,7 @@ TEST_F(Disturbed, WhoStandsOpensNoMapOnWhatHidesTheWorld) {
 }
 
 TEST_F(Disturbed, WhoDrivesGoesOnWhateverPassesBy) {
-  const StateDrive drive = steady_drive();
-  copy("steady", drive);
+  const StateDrive drive = copied("steady", steady_drive());
   const int begin = 15;
   const int end = 45;
   const Passing passing(begin, 26, kImage);
