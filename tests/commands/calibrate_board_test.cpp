@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Photos of a chessboard become a camera file that a run takes.
-#include <nlohmann/json.hpp>
-
 #include "support/program_test.hpp"
 #include "support/rendered_board.hpp"
 #include "support/test.hpp"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <nlohmann/json.hpp>
-
 #include "evaluation/trajectory.hpp"
 #include "support/kitti_clips.hpp"
 #include "support/program_test.hpp"
@@ -38,7 +36,7 @@ class Handheld : public OtherCameras {
     expect_poses({folder_ / "images", "--camera", (shared_data() / "handheld/camera.yaml").string(),
                   "--gt", poses.string(), "--set", "scale.source=none"},
                  count);
-    return nlohmann::json::parse(read_file(folder_ / "out/metrics.json"));
+    return metrics_of(folder_ / "out");
   }
 
   /// Frames first, first + step, ..; the bounds are today's figures and half as much again.
