@@ -81,7 +81,7 @@ TEST_F(LongRun, ASecondProcessIsRefusedUntilTheFirstIsGone) {
 TEST(SameBytes, TwoRunsAndAnyNumberOfThreadsGiveTheSameBytes) {
   const TempFolder folder;
   const std::string sequence = rendered_drive() / "sequences/00";
-  std::vector<std::vector<std::string>> variants = {{}};
+  std::vector<Words> variants = {{}};
   for (int round = 0; round < 3; ++round) {
     for (const char* threads : {"1", "2", "4"}) {
       variants.push_back({"--threads", threads});
@@ -90,8 +90,7 @@ TEST(SameBytes, TwoRunsAndAnyNumberOfThreadsGiveTheSameBytes) {
   std::string first;
   for (std::size_t i = 0; i < variants.size(); ++i) {
     const std::string out = folder / std::to_string(i);
-    variants[i].insert(variants[i].begin(), {"run", sequence, "--out", out});
-    succeeded(run_stemvo(variants[i]));
+    succeeded(run_stemvo({"run", sequence, "--out", out}, variants[i]));
     const std::string bytes =
         read_file(out + "/trajectory_kitti.txt") + read_file(out + "/trajectory_tum.txt");
     first = i == 0 ? bytes : first;

@@ -116,9 +116,7 @@ TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
          [&](int i, cv::Mat& image) { passing.draw(i, image); });
   const StateRun result = run();
   result.expect_states(drive.event_begin, drive.event_end, {"stationary"});
-  const auto begin = static_cast<std::size_t>(drive.event_begin);
-  const auto end = static_cast<std::size_t>(drive.event_end);
-  const Rigid3 moved = result.poses[begin].inverse() * result.poses[end - 1];
+  const Rigid3 moved = result.motion(drive.event_begin, drive.event_end - 1);
   EXPECT_LE(moved.translation.norm(), 0.02);  // measured, not held: 0.2 % of a depth of 10 m
   const int num_frames = static_cast<int>(result.poses.size());
   expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
@@ -134,8 +132,7 @@ TEST_F(Disturbed, WhoStandsOpensNoMapOnWhatHidesTheWorld) {
   const int num_frames = static_cast<int>(result.poses.size());
   result.expect_states(drive.event_begin, num_frames,
                        {"stationary", "lost", "low_parallax", "rotating", "tracking"});
-  const Rigid3 moved = result.poses[static_cast<std::size_t>(drive.event_begin)].inverse() *
-                       result.poses[static_cast<std::size_t>(drive.event_end) - 1];
+  const Rigid3 moved = result.motion(drive.event_begin, drive.event_end - 1);
   EXPECT_LE(moved.translation.norm(), 0.02);  // 8.4 by a map on what passes
   expect_accurate(result.poses, drive, drive.event_end + 3, num_frames, 0.05, 0.3 * kDeg);
 }
