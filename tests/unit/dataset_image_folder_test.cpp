@@ -254,10 +254,8 @@ class ImageList : public ::testing::Test {
   static std::vector<std::string> names(const fs::path& path) {
     const auto list = list_images(path);
     std::vector<std::string> result;
-    if (list) {
-      for (const fs::path& file : list->files) {
-        result.push_back(file.filename().string());
-      }
+    for (const fs::path& file : list->files) {
+      result.push_back(file.filename().string());
     }
     return result;
   }
