@@ -40,7 +40,9 @@ Expected<int> render(SynthArguments& arguments) {
   if (is_interrupted()) {
     return kExitInterrupted;
   }
-  STEMVO_TRY(status);
+  if (!status) {
+    return status.error();
+  }
   const std::string& name = arguments.options.name;
   const std::string sequence = (arguments.out_dir / "sequences" / name).string();
   print(fmt::format("sequence: {}\n", sequence));

@@ -278,8 +278,7 @@ Expected<FrameResult> Odometry::process(const cv::Mat& image,
   if (impl_->loops.has_thrown()) {
     impl_->loops.finish();  // throws it
   }
-  STEMVO_TRY(status);
-  return *impl_->take();
+  return status ? *impl_->take() : Expected<FrameResult>(status.error());
 }
 
 void Odometry::reset() {
