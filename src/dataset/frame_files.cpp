@@ -10,7 +10,6 @@
 
 #include "dataset/image_names.hpp"
 #include "odometry/check_frame.hpp"
-#include "odometry/frame_view.hpp"
 #include "try.hpp"
 
 namespace stemvo::dataset {
@@ -186,11 +185,11 @@ Status check_size(const cv::Size& found,
                                 found.width, found.height));
 }
 
-Status add_view(FrameSource& frames,
-                const CameraFile& camera,
-                const fs::path& camera_file,
-                const std::vector<std::string>& masks,
-                std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
+Expected<FrameView> add_view(FrameSource& frames,
+                             const CameraFile& camera,
+                             const fs::path& camera_file,
+                             const std::vector<std::string>& masks,
+                             std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
   STEMVO_TRY_GET(const FrameView view,
                  named(camera_file.string(), FrameView::create(camera.camera)));
   STEMVO_TRY_GET(const auto mask, make_mask(masks, view.full_size()));
@@ -208,7 +207,7 @@ Status add_view(FrameSource& frames,
     return read_whole(index).map(
         [&](const cv::Mat& image) { return image.empty() ? image : view.apply(image); });
   };
-  return {};
+  return view;
 }
 
 Expected<SharedKind> vote_on_images(FrameSource& frames) {

@@ -18,6 +18,7 @@
 #include "dataset/listing.hpp"
 #include "dataset/video_stream.hpp"
 #include "io/image_file.hpp"
+#include "odometry/frame_view.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
 #include "text/text_file.hpp"
@@ -80,11 +81,12 @@ namespace stemvo::dataset {
                                 const std::filesystem::path& camera_file);
 /// Adds the camera file's view, mask and reader: `read_whole` gives the frames as they come, of the
 /// view's full size. Errors: those of FrameView::create, naming the camera file, and of make_mask.
-[[nodiscard]] Status add_view(FrameSource& frames,
-                              const CameraFile& camera,
-                              const std::filesystem::path& camera_file,
-                              const std::vector<std::string>& masks,
-                              std::function<Expected<cv::Mat>(std::size_t)> read_whole);
+[[nodiscard]] Expected<FrameView> add_view(
+    FrameSource& frames,
+    const CameraFile& camera,
+    const std::filesystem::path& camera_file,
+    const std::vector<std::string>& masks,
+    std::function<Expected<cv::Mat>(std::size_t)> read_whole);
 
 struct SharedKind {
   cv::Size size;
