@@ -47,7 +47,9 @@ void add_options(CLI::App& command, ChannelArguments& arguments) {
                   "A recording: a folder, a video, a pattern of images (see 'stemvo run --help')")
       ->required()
       ->type_name("");
-  add_out_folder(command, arguments.request.out_dir, "Folder for the images; created");
+  command.add_option("--out", arguments.request.out_dir, "Folder for the images; created")
+      ->required()
+      ->type_name("DIR");
   add_range_option(command, "--frames", arguments.request.frames,
                    "Frames A to B-1; default: the first one");
   add_range_option(command, "--filters", arguments.request.filters,

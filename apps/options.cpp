@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "text/text_file.hpp"
 #include "try.hpp"
 
 namespace stemvo::apps {
@@ -20,20 +21,18 @@ std::filesystem::path config_folder() {
   std::error_code code;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", code);
   const auto installed = program.parent_path().parent_path() / "share/stemvo/config";
-  return !code && std::filesystem::is_directory(installed, code)
-             ? installed
-             : std::filesystem::path(STEMVO_SOURCE_DIR) / "config";
+  return !code && is_folder(installed) ? installed
+                                       : std::filesystem::path(STEMVO_SOURCE_DIR) / "config";
 }
 
 Expected<std::filesystem::path> find_config(const std::string& given) {
-  std::error_code code;
   const std::filesystem::path file(given);
-  if (std::filesystem::exists(file, code) || file.has_parent_path()) {
+  if (is_there(file) || file.has_parent_path()) {
     return file;
   }
   for (const std::string& name : {given, given + ".yaml"}) {
     const std::filesystem::path shipped = config_folder() / name;
-    if (std::filesystem::exists(shipped, code)) {
+    if (is_there(shipped)) {
       return shipped;
     }
   }
@@ -77,11 +76,11 @@ void add_config_options(CLI::App& command, ConfigArguments& arguments) {
       });
 }
 
-Expected<Config> read_config(const ConfigArguments& arguments, const Config& base) {
-  Config config = base;
+Expected<Config> read_config(const ConfigArguments& arguments) {
+  Config config;
   if (!arguments.file.empty()) {
     STEMVO_TRY_GET(const auto file, find_config(arguments.file));
-    STEMVO_TRY_GET(config, load_config(file, base));
+    STEMVO_TRY_GET(config, load_config(file));
   }
   std::map<std::string, std::string> given;  // key -> the assignment
   for (const std::string& assignment : arguments.overrides) {
@@ -110,12 +109,6 @@ CLI::Option* add_file_option(CLI::App& command,
     }
   };
   return command.add_option_function<std::string>(name, take, help)->type_name("FILE");
-}
-
-CLI::Option* add_out_folder(CLI::App& command,
-                            std::filesystem::path& folder,
-                            const std::string& help) {
-  return command.add_option("--out", folder, help)->required()->type_name("DIR");
 }
 
 CLI::Option* add_rate_option(CLI::App& command, std::optional<double>& rate_hz) {

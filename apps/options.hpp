@@ -23,9 +23,8 @@ void add_config_options(CLI::App& command, ConfigArguments& arguments);
 
 /// Defaults, then the file, then each --set (a key twice is an error), then the checks of the
 /// whole. A file that is not there as given and has no folder in its name is looked up among the
-/// configurations that come with the program, with or without ".yaml". `base`: the defaults.
-[[nodiscard]] Expected<Config> read_config(const ConfigArguments& arguments,
-                                           const Config& base = {});
+/// configurations that come with the program, with or without ".yaml".
+[[nodiscard]] Expected<Config> read_config(const ConfigArguments& arguments);
 
 /// An option FILE; without text it counts as not given.
 CLI::Option* add_file_option(CLI::App& command,
@@ -37,15 +36,8 @@ CLI::Option* add_file_option(CLI::App& command,
 template <typename Number>
 [[nodiscard]] CLI::Validator in_range(Number min, Number max);
 
-/// --out DIR, which must be given.
-CLI::Option* add_out_folder(CLI::App& command,
-                            std::filesystem::path& folder,
-                            const std::string& help = "Folder for the results; created");
-
-/// --rate HZ.
 CLI::Option* add_rate_option(CLI::App& command, std::optional<double>& rate_hz);
 
-/// --gt-tolerance S.
 void add_tolerance_option(CLI::App& command, double& tolerance_s);
 
 /// An option "A:B"; text of another form is wrong usage.

@@ -154,11 +154,11 @@ void add_options(CLI::App& command, RunArguments& arguments) {
           "A recording: a folder, a video, a quoted pattern of images, camera:N (see below)")
       ->required()
       ->type_name("");
-  add_out_folder(
-      command, request.out_dir,
-      "Folder for the results; created; one of stemvo's is replaced, others are refused; "
-      "default: a new results/NAME of INPUT")
-      ->required(false);
+  command
+      .add_option("--out", request.out_dir,
+                  "Folder for the results; created; one of stemvo's is replaced, others are "
+                  "refused; default: a new results/NAME of INPUT")
+      ->type_name("DIR");
   add_config_options(command, arguments.config);
   add_range_option(command, "--frames", request.frames, "Frames A to B-1 only");
   add_file_option(command, "--gt", request.ground_truth,

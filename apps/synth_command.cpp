@@ -10,7 +10,6 @@
 #include "console.hpp"
 #include "options.hpp"
 #include "synth/synth.hpp"
-#include "try.hpp"
 
 namespace stemvo::apps {
 namespace {

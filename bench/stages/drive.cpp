@@ -90,7 +90,8 @@ Chain run_chain() {
     frame.image = pixels;
     const ChannelImage road = road_contrast.apply(road_channel(pixels, result.camera));
     frame.road = std::make_shared<RoadImage>(make_road_image(road, result.camera));
-    frame.matches = front_end->process(result.images.back(), {i, frame.time_s});
+    frame.matches =
+        front_end->process(front_end->prepare(result.images.back(), {}), {i, frame.time_s});
     if (i == last) {
       result.matches = frame.matches;
       result.last = std::move(frame);

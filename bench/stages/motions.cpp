@@ -40,7 +40,7 @@ void essential(State& state) {
 void two_view_refinement(State& state) {
   const Chain& c = chain();
   const TwoViewEstimator estimator(c.config);
-  run_stage(state, Stage::kTwoViewRefinement, [&] {
+  run_stage(state, "two-view refinement", [&] {
     benchmark::DoNotOptimize(estimator.measure({c.matches.prev_uv, c.matches.cur_uv}, c.camera,
                                                /*is_initializing=*/false));
   });
@@ -56,7 +56,7 @@ void two_view(State& state, bool is_initializing) {
 }
 
 /// The last frame, from the window as it was before it.
-void run_last_frame(State& state, Stage stage) {
+void run_last_frame(State& state, const char* stage) {
   const Chain& c = chain();
   run_stage(state, stage, [&] {
     WindowEstimator estimator = *c.estimator;
@@ -65,9 +65,9 @@ void run_last_frame(State& state, Stage stage) {
   });
 }
 
-void localization(State& state) { run_last_frame(state, Stage::kLocalization); }
-void window_refinement(State& state) { run_last_frame(state, Stage::kWindowRefinement); }
-void road_scale(State& state) { run_last_frame(state, Stage::kRoadScale); }
+void localization(State& state) { run_last_frame(state, "localization"); }
+void window_refinement(State& state) { run_last_frame(state, "window refinement"); }
+void road_scale(State& state) { run_last_frame(state, "road scale"); }
 
 BENCHMARK(homography)->Unit(benchmark::kMillisecond);
 BENCHMARK(fundamental)->Unit(benchmark::kMillisecond);

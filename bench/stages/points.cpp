@@ -51,7 +51,7 @@ class Images {
   std::size_t next_ = 0;
 };
 
-void run_tracker(State& state, FeatureMethod method, Stage stage) {
+void run_tracker(State& state, FeatureMethod method, const char* stage) {
   Images images(method);
   run_stage(state, stage, [&] {
     images.advance([](FrontEnd& front_end, const Prepared& image) {
@@ -61,12 +61,12 @@ void run_tracker(State& state, FeatureMethod method, Stage stage) {
 }
 
 /// Corners where the tracks of the frame before left room.
-void detection(State& state) { run_tracker(state, FeatureMethod::kPatch, Stage::kDetection); }
+void detection(State& state) { run_tracker(state, FeatureMethod::kPatch, "detection"); }
 
-void patches(State& state) { run_tracker(state, FeatureMethod::kPatch, Stage::kTracking); }
+void patches(State& state) { run_tracker(state, FeatureMethod::kPatch, "tracking"); }
 
 /// Forward and back.
-void klt(State& state) { run_tracker(state, FeatureMethod::kKlt, Stage::kTracking); }
+void klt(State& state) { run_tracker(state, FeatureMethod::kKlt, "tracking"); }
 
 /// OpenCV's tracker alone, there only, on all levels of the pyramid, with as many corners.
 void klt_forward(State& state) {
@@ -102,7 +102,7 @@ void orb_detect_and_describe(State& state) {
 void orb_match(State& state) {
   Images images(FeatureMethod::kOrb);
   std::size_t i = 0;
-  run_stage(state, Stage::kTracking, [&] {
+  run_stage(state, "tracking", [&] {
     if (i == 0) {
       static_cast<void>(images.front_end().process(images.prepared().front(), {}));
     }

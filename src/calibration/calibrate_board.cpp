@@ -76,7 +76,7 @@ Expected<cv::Size> look_at_images(const BoardRequest& request,
                                   BoardReport& report) {
   const fs::path inside = request.pictures / "images";
   STEMVO_TRY_GET(const auto listing,
-                 dataset::list_images(dataset::is_folder(inside) ? inside : request.pictures));
+                 dataset::list_images(is_folder(inside) ? inside : request.pictures));
   FrameSource frames;
   frames.files = listing.files;
   STEMVO_TRY(pipeline::check_is_no_input(request.out_file, frames.files));
@@ -138,7 +138,7 @@ std::string file_text(const BoardRequest& request, const BoardReport& report) {
 
 Expected<BoardReport> calibrate_board(const BoardRequest& request, const RunProgress& progress) {
   STEMVO_TRY(check_can_write(request.out_file));
-  const auto look = dataset::is_file(request.pictures) && !dataset::is_image_file(request.pictures)
+  const auto look = is_file(request.pictures) && !dataset::is_image_file(request.pictures)
                         ? look_at_video
                         : look_at_images;
   BoardReport report;

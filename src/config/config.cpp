@@ -61,12 +61,12 @@ std::vector<config::Key> keys_of(Config& config) {
 
 }  // namespace
 
-Expected<Config> load_config(const std::filesystem::path& file, const Config& base) {
+Expected<Config> load_config(const std::filesystem::path& file) {
   STEMVO_TRY_GET(const auto root,
                  read_text_file(file, kMaxSettings_MB).and_then([&](const std::string& text) {
                    return config::parse_document(text, file.string());
                  }));
-  Config result = base;
+  Config result;
   result.file = file;
   std::vector<config::Key> keys = keys_of(result);
   STEMVO_TRY(config::read_map(root, "", file.string(), keys));

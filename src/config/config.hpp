@@ -36,10 +36,9 @@ struct Config : Options {
   std::set<std::string> keys_overridden;  ///< of apply_override
 };
 
-/// Reads a YAML file over `base`. Errors with file and line: not YAML, unknown or duplicated key,
-/// wrong type, value out of range.
-[[nodiscard]] Expected<Config> load_config(const std::filesystem::path& file,
-                                           const Config& base = {});
+/// Reads a YAML file over the defaults. Errors with file and line: not YAML, unknown or duplicated
+/// key, wrong type, value out of range.
+[[nodiscard]] Expected<Config> load_config(const std::filesystem::path& file);
 /// `key=value` of --set, e.g. "stem.filter=10".
 [[nodiscard]] Status apply_override(Config& config, const std::string& assignment);
 [[nodiscard]] Status validate(const Config& config);

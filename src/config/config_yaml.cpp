@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <ranges>
 #include <sstream>
 
 #include <fmt/ranges.h>
@@ -61,16 +62,10 @@ std::string unknown_key(std::string_view section,
 int line_of(const YAML::Node& node) { return node.Mark().line + 1; }
 
 std::string_view kind_of(const YAML::Node& node) {
-  switch (node.Type()) {
-    case YAML::NodeType::Sequence:
-      return "a list";
-    case YAML::NodeType::Map:
-      return "a group of keys";
-    case YAML::NodeType::Scalar:
-      return "a value";
-    default:
-      return "nothing";
-  }
+  return node.IsSequence() ? "a list"
+         : node.IsMap()    ? "a group of keys"
+         : node.IsScalar() ? "a value"
+                           : "nothing";
 }
 
 /// Finds where documents begin: YAML::Load reads the first and leaves out others without a word,
@@ -221,10 +216,7 @@ std::string format(const std::string& value) {
 }
 
 std::string format(const std::vector<double>& value) {
-  std::vector<std::string> texts;
-  for (const double number : value) {
-    texts.push_back(format(number));
-  }
+  const auto texts = value | std::views::transform([](double number) { return format(number); });
   return fmt::format("[{}]", fmt::join(texts, ", "));
 }
 

@@ -19,10 +19,6 @@ struct CameraFile {
   std::optional<Rigid3> body_from_camera;  ///< EuRoC's T_BS, or of Kalibr's T_cam_imu
   double imu_from_camera_s = 0.0;          ///< added to a frame's time, the gyro's (Kalibr)
   std::vector<std::string> warnings;       ///< what may be meant otherwise
-
-  [[nodiscard]] std::optional<Eigen::Quaterniond> camera_from_imu() const {
-    return body_from_camera ? std::optional(body_from_camera->rotation.inverse()) : std::nullopt;
-  }
 };
 
 /// The format is told by its keys: ours (`stemvo run --help`), with T_BS EuRoC's sensor.yaml;

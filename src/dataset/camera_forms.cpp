@@ -80,12 +80,8 @@ Expected<CameraFile> read_colmap_camera(const std::filesystem::path& file) {
     if (split_words(lines[i]).empty() || lines[i].starts_with('#')) {
       continue;
     }
-    const auto camera = parse_colmap_row(lines[i]);
-    if (!camera) {
-      return fail_at(file, i, camera.error());
-    }
-    STEMVO_TRY(check_camera(*camera, fmt::format("{}:{}", file.string(), i + 1)));
-    result.camera = *camera;
+    STEMVO_TRY_GET(result.camera, at_line(file, i, parse_colmap_row(lines[i])));
+    STEMVO_TRY(check_camera(result.camera, fmt::format("{}:{}", file.string(), i + 1)));
     ++num_cameras;
   }
   return num_cameras == 1

@@ -78,16 +78,6 @@ double rate_of(const CameraFile& camera, const FrameSourceRequest& request, Fram
 
 }  // namespace
 
-bool is_file(const fs::path& path) {
-  std::error_code code;
-  return fs::is_regular_file(path, code);
-}
-
-bool is_folder(const fs::path& path) {
-  std::error_code code;
-  return fs::is_directory(path, code);
-}
-
 fs::path absolute_folder(const fs::path& folder) {
   std::error_code code;
   return (fs::absolute(folder, code) / "").lexically_normal().parent_path();
@@ -200,15 +190,14 @@ Expected<FrameView> add_view(FrameSource& frames,
                              const fs::path& camera_file,
                              const std::vector<std::string>& masks,
                              std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
-  const auto made = FrameView::create(camera.camera);
-  if (!made) {
-    return fail(camera_file.string() + ": " + made.error().message);
-  }
-  const FrameView& view = *made;
+  STEMVO_TRY_GET(const FrameView view,
+                 named(camera_file.string(), FrameView::create(camera.camera)));
   STEMVO_TRY_GET(const auto mask, make_mask(masks, view.full_size()));
   frames.given_calibration = camera_file;
   frames.camera_height_m = camera.camera_height_m;
-  frames.camera_from_imu = camera.camera_from_imu();
+  if (camera.body_from_camera) {
+    frames.camera_from_imu = camera.body_from_camera->rotation.inverse();
+  }
   frames.imu_from_camera_s = camera.imu_from_camera_s;
   frames.mask = view.apply_to_mask(mask);
   frames.full_size = view.full_size();

@@ -26,8 +26,6 @@
 /// Parts that all frame sources share.
 namespace stemvo::dataset {
 
-[[nodiscard]] bool is_file(const std::filesystem::path& path);
-[[nodiscard]] bool is_folder(const std::filesystem::path& path);
 /// Without a trailing separator, so that its last part is the folder's name.
 [[nodiscard]] std::filesystem::path absolute_folder(const std::filesystem::path& folder);
 /// The last part of a folder's name that not every recording has, as `images` or `cam0`.

@@ -18,8 +18,8 @@ namespace fs = std::filesystem;
 /// A file or folder that `python -m stemvo.bag` reads.
 bool is_bag(const fs::path& path) {
   const fs::path kind = path.extension();
-  return dataset::is_file(path) ? kind == ".bag" || kind == ".mcap" || kind == ".db3"
-                                : dataset::is_file(path / "metadata.yaml");
+  return is_file(path) ? kind == ".bag" || kind == ".mcap" || kind == ".db3"
+                       : is_file(path / "metadata.yaml");
 }
 
 Error refuse(const fs::path& path) {
@@ -30,14 +30,14 @@ Error refuse(const fs::path& path) {
     problem =
         "images: expected --camera FILE, or camera.yaml in their folder, found neither; "
         "'stemvo run --help' shows what it holds";
-  } else if (dataset::is_folder(path / "sequences")) {
+  } else if (is_folder(path / "sequences")) {
     problem = "expected one recording, found a folder of them; give one, as sequences/00 in it";
   } else if (dataset::is_image_file(path)) {
     problem = "expected a recording, found one image; give its folder, or a quoted pattern";
   } else if (is_bag(path)) {
     problem =
         "expected a recording, found a ROS bag; 'python -m stemvo.bag BAG FOLDER' makes one of it";
-  } else if (!dataset::is_folder(path)) {
+  } else if (!is_folder(path)) {
     problem = fmt::format(
         "expected a folder, a video file, a quoted pattern of images or camera:N, found {}; check "
         "the path ('stemvo run --help' lists what is read)",
@@ -49,7 +49,7 @@ Error refuse(const fs::path& path) {
 std::optional<Expected<dataset::Listing>> find_listing(const FrameSourceRequest& request) {
   const fs::path& path = request.sequence_dir;
   auto found = dataset::find_listing(path);
-  const bool may_hold_images = dataset::is_folder(path) || dataset::is_pattern(path);
+  const bool may_hold_images = is_folder(path) || dataset::is_pattern(path);
   if (found || !request.camera_file || !may_hold_images) {
     return found;
   }
@@ -154,7 +154,7 @@ std::string dataset::without_secrets(const std::string& text) {
 
 bool dataset::is_address(const fs::path& path) {
   constexpr std::string_view kKinds[] = {"rtsp://", "rtsps://", "http://", "https://"};
-  return !dataset::is_file(path) && std::ranges::any_of(kKinds, [text = path.string()](auto kind) {
+  return !is_file(path) && std::ranges::any_of(kKinds, [text = path.string()](auto kind) {
     return text.starts_with(kind);
   });
 }
@@ -181,13 +181,12 @@ Config dataset::with_camera_height(Config config, const FrameSource& frames) {
 
 Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   const fs::path& path = request.sequence_dir;
-  if (dataset::is_file(path) && (is_bag(path) || dataset::is_image_file(path))) {
+  if (is_file(path) && (is_bag(path) || dataset::is_image_file(path))) {
     return refuse(path);
   }
-  const bool is_stream =
-      dataset::camera_number(path) || dataset::is_address(path) || dataset::is_file(path);
+  const bool is_stream = dataset::camera_number(path) || dataset::is_address(path) || is_file(path);
   const auto listing = is_stream ? std::nullopt : find_listing(request);
-  if (!is_stream && !listing && !dataset::is_folder(path)) {
+  if (!is_stream && !listing && !is_folder(path)) {
     return refuse(path);
   }
   STEMVO_TRY(check_unused(request, listing.has_value(), is_stream));

@@ -9,7 +9,6 @@
 #include <map>
 #include <regex>
 #include <set>
-#include <string>
 #include <tuple>
 #include <utility>
 

@@ -63,18 +63,13 @@ Expected<Camera> read_kitti_camera(const std::filesystem::path& file, int index)
   std::optional<Camera> camera;
   cv::Size size;  // zero: the file says none
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    Status row;
     std::string_view rest = lines[i];
     if (camera_of(rest) == index) {
-      const auto found = parse_projection(rest).and_then(to_camera);
-      row = found ? Status() : found.error();
-      camera = found.value_or(Camera());
+      STEMVO_TRY_GET(camera, at_line(file, i, parse_projection(rest).and_then(to_camera)));
     } else if (take_word(rest) == fmt::format("S_rect_0{}:", index)) {
-      const auto sides = parse_numbers(rest, 2);
-      row = sides ? Status() : sides.error();
-      size = sides ? cv::Size2d((*sides)[0], (*sides)[1]) : cv::Size2d();
+      STEMVO_TRY_GET(const auto sides, at_line(file, i, parse_numbers(rest, 2)));
+      size = cv::Size2d(sides[0], sides[1]);
     }
-    STEMVO_TRY(row ? row : fail_at(file, i, row.error()));
   }
   if (!camera) {
     return fail(fmt::format("{}: expected a row 'P{}:' for image_{}, found none in {} lines",
@@ -146,8 +141,7 @@ constexpr std::size_t kDigits = 6;  // of KITTI's %06d.png
 Expected<int> choose_camera(const fs::path& directory, const std::string& option) {
   for (const int index : {2, 0, 1, 3}) {
     const std::string name = fmt::format("image_{}", index);
-    if ((option == name || (option == "auto" && index % 2 == 0)) &&
-        dataset::is_folder(directory / name)) {
+    if ((option == name || (option == "auto" && index % 2 == 0)) && is_folder(directory / name)) {
       return index;
     }
   }
@@ -212,9 +206,8 @@ Status set_images(const fs::path& calibration, bool is_color, FrameSource& frame
 }  // namespace
 
 bool looks_like_kitti(const fs::path& folder) {
-  std::error_code code;
   constexpr const char* kNames[] = {"image_0", "image_1", "image_2", "image_3", "calib.txt"};
-  return std::ranges::any_of(kNames, [&](auto name) { return fs::exists(folder / name, code); });
+  return std::ranges::any_of(kNames, [&](auto name) { return is_there(folder / name); });
 }
 
 Expected<FrameSource> open_kitti(const fs::path& directory, const SequenceOptions& options) {

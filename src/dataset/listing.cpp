@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/listing.hpp"
 
-#include <algorithm>
 #include <cctype>
-#include <system_error>
 
 #include <fmt/format.h>
 #include <fnmatch.h>
@@ -18,11 +16,6 @@ namespace stemvo::dataset {
 namespace fs = std::filesystem;
 
 namespace {
-
-bool is_there(const fs::path& file) {
-  std::error_code code;
-  return fs::exists(file, code);
-}
 
 std::optional<fs::path> if_exists(const fs::path& file) {
   return is_there(file) ? std::optional(file) : std::nullopt;
@@ -118,8 +111,7 @@ bool matches_pattern(const std::string& name, const std::string& pattern) {
 bool is_image_file(const fs::path& file) { return has_image_name(file) && is_file(file); }
 
 bool is_pattern(const fs::path& path) {
-  std::error_code code;
-  return path.string().find_first_of("*?[") != std::string::npos && !fs::exists(path, code);
+  return path.string().find_first_of("*?[") != std::string::npos && !is_there(path);
 }
 
 Expected<Listing> list_images(const fs::path& given) {

@@ -17,8 +17,7 @@ namespace {
 constexpr double kMaxGap_s = 0.1;  ///< between rates that a rotation is integrated from
 
 Expected<std::vector<double>> numbers_of(const TimedRow& row, const std::filesystem::path& file) {
-  auto numbers = parse_numbers(row.rest, split_words(row.rest).size());
-  return numbers ? numbers : fail_at(file, row.line, numbers.error());
+  return at_line(file, row.line, parse_numbers(row.rest, split_words(row.rest).size()));
 }
 
 /// Error: a comment of the file names `others`, as other units or columns, and not `own`.

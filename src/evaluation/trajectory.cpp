@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <ranges>
 #include <regex>
 #include <string>
 #include <string_view>
@@ -144,11 +145,7 @@ Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Forma
     if (format != Format::kKitti && is_blank(line)) {
       continue;
     }
-    const Expected<TimedPose> row = parse_row(format, line);
-    if (!row) {
-      return fail_at(file, i, row.error());
-    }
-    rows.push_back(*row);
+    STEMVO_TRY_GET(rows.emplace_back(), at_line(file, i, parse_row(format, line)));
   }
   if (rows.empty()) {
     return fail(fmt::format("{}: expected at least one pose, found none", file.string()));
@@ -271,11 +268,8 @@ std::string tum_row(double timestamp_s, const Rigid3& world_from_camera) {
 
 Status write_kitti_trajectory(const std::filesystem::path& file,
                               std::span<const Rigid3> world_from_camera) {
-  std::string text;
-  for (const Rigid3& pose : world_from_camera) {
-    text += kitti_row(pose);
-  }
-  return write_text_file(file, text);
+  const auto rows = world_from_camera | std::views::transform(kitti_row);
+  return write_text_file(file, fmt::format("{}", fmt::join(rows, "")));
 }
 
 Status write_tum_trajectory(const std::filesystem::path& file,

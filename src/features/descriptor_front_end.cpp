@@ -25,11 +25,6 @@ cv::Ptr<cv::Feature2D> create_feature(const FeatureOptions& options) {
   return cv::SIFT::create(num_asked);
 }
 
-/// Strongest first; ties by place, so that the order never depends on the detector's threads.
-bool is_stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
-  return std::tuple(-a.response, a.pt.y, a.pt.x) < std::tuple(-b.response, b.pt.y, b.pt.x);
-}
-
 /// Detect, describe, match by brute force: the paper's way (ORB) and the classic one (SIFT).
 class DescriptorFrontEnd final : public FrontEnd {
  public:
@@ -45,7 +40,10 @@ class DescriptorFrontEnd final : public FrontEnd {
       feature_->detect(channel.pixels, found,
                        described->mask_of(channel.map, channel.pixels.size()));
     });
-    std::sort(found.begin(), found.end(), is_stronger);
+    // Strongest first; ties by place, so that the order never depends on the detector's threads.
+    std::ranges::sort(found, {}, [](const cv::KeyPoint& point) {
+      return std::tuple(-point.response, point.pt.y, point.pt.x);
+    });
     GridQuota quota(options_, channel.pixels.size());
     std::vector<cv::KeyPoint> kept;
     for (const cv::KeyPoint& keypoint : found) {

@@ -17,13 +17,9 @@ cv::Mat ImagePyramid::mask_of(const PixelMap& map, cv::Size size) const {
 }
 
 std::unique_ptr<FrontEnd> create_front_end(const FeatureOptions& options) {
-  if (options.method == FeatureMethod::kPatch) {
-    return create_patch_front_end(options);
-  }
-  if (options.method == FeatureMethod::kKlt) {
-    return create_klt_front_end(options);
-  }
-  return create_descriptor_front_end(options);
+  return options.method == FeatureMethod::kPatch ? create_patch_front_end(options)
+         : options.method == FeatureMethod::kKlt ? create_klt_front_end(options)
+                                                 : create_descriptor_front_end(options);
 }
 
 }  // namespace stemvo

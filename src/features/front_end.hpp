@@ -69,9 +69,6 @@ class FrontEnd {
   /// `image` was prepared by this front end (not checked).
   [[nodiscard]] virtual Matches process(std::shared_ptr<const ImagePyramid> image,
                                         const ImageClue& clue) = 0;
-  [[nodiscard]] Matches process(const ChannelImage& image, const ImageClue& clue = {}) {
-    return process(prepare(image, {}), clue);
-  }
   /// Ends the tracks of the last matches that are no inliers (one flag per match).
   virtual void remove_outliers(const std::vector<char>& is_inlier) = 0;
   /// Takes the projections of landmarks into the last image (also outside of it) whose tracks

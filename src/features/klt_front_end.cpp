@@ -21,12 +21,6 @@ constexpr int kMinReach_px = 3;
 /// In a pyramid each level is followed by its derivatives.
 constexpr std::size_t kNextLevel = 2;
 
-/// Distance in input pixels between two points of one image.
-double input_distance_px(const PixelMap& map, const cv::Point2f& a, const cv::Point2f& b) {
-  const Eigen::Vector2d difference(a.x - b.x, a.y - b.y);
-  return map.scale.cwiseProduct(difference).norm();
-}
-
 bool is_inside(const cv::Point2f& uv, cv::Size size) {
   return uv.x >= 0.0F && uv.y >= 0.0F && uv.x <= static_cast<float>(size.width - 1) &&
          uv.y <= static_cast<float>(size.height - 1);
@@ -90,10 +84,12 @@ class KltFrontEnd final : public PointFrontEnd {
                              cv::OPTFLOW_USE_INITIAL_FLOW);
 
     for (std::size_t i = 0; i < result.size(); ++i) {
+      const cv::Point2f off = prev_uv[i] - back_uv[i];
+      const double off_px =
+          prev.channel.map.scale.cwiseProduct(Eigen::Vector2d(off.x, off.y)).norm();
       const bool is_good = found[i] != 0 && found_back[i] != 0 &&
                            is_inside(cur_uv[i], cur.channel.pixels.size()) &&
-                           input_distance_px(prev.channel.map, prev_uv[i], back_uv[i]) <=
-                               options().max_forward_backward_px;
+                           off_px <= options().max_forward_backward_px;
       if (is_good) {
         result[i] = cur_uv[i];
       }

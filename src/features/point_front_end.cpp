@@ -22,10 +22,6 @@ cv::Point pixel_of(const cv::Mat& image, const cv::Point2f& uv) {
 /// several pixels wide, and any pixel of a corner will do.
 std::size_t detection_level(const ImagePyramid& image) { return image.levels.size() > 1 ? 1 : 0; }
 
-bool is_allowed(const cv::Mat& mask, const cv::Point2f& uv) {
-  return mask.empty() || mask.at<unsigned char>(pixel_of(mask, uv)) != 0;
-}
-
 }  // namespace
 
 Matches PointFrontEnd::process(std::shared_ptr<const ImagePyramid> image, const ImageClue& clue) {
@@ -92,7 +88,8 @@ Matches PointFrontEnd::track(const View& from, View& to) {
   const cv::Mat mask = to.image->mask_of(to.image->channel.map, to.image->channel.pixels.size());
   to.points.reserve(found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
-    if (!found[i].has_value() || !is_allowed(mask, *found[i])) {
+    if (!found[i].has_value() ||
+        (!mask.empty() && mask.at<unsigned char>(pixel_of(mask, *found[i])) == 0)) {
       continue;
     }
     const Point& point = from.points[i];

@@ -20,7 +20,6 @@ class PointFrontEnd : public FrontEnd {
  public:
   explicit PointFrontEnd(const FeatureOptions& options) : options_(options) {}
 
-  using FrontEnd::process;
   [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image,
                                 const ImageClue& clue) override;
   void remove_outliers(const std::vector<char>& is_inlier) override;

@@ -47,13 +47,6 @@ struct ModelScore {
 /// E may have any scale.
 [[nodiscard]] std::array<Rigid3, 4> decompose_essential(const Eigen::Matrix3d& essential);
 
-/// E = K^T F K.
-[[nodiscard]] inline Eigen::Matrix3d essential_from_fundamental(const Eigen::Matrix3d& fundamental,
-                                                                const Camera& camera) {
-  const Eigen::Matrix3d k = camera.matrix();
-  return k.transpose() * fundamental * k;
-}
-
 /// F = K^-T E K^-1.
 [[nodiscard]] inline Eigen::Matrix3d fundamental_from_essential(const Eigen::Matrix3d& essential,
                                                                 const Camera& camera) {

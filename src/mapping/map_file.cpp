@@ -69,15 +69,22 @@ class MapReader {
 
 // The fields that are read and written are listed once: `Archive` is one of the two above.
 
-void pass_all(auto& archive, auto&... values) { (archive(values), ...); }
+void pass(auto& archive, Number auto& number) { archive(number); }
 
-void pass_each(auto& archive, auto&& numbers) {
-  for (auto& number : numbers) {
-    archive(number);
+void pass_all(auto& archive, auto&... values) { (pass(archive, values), ...); }
+
+/// Elements of a list behind their number; of an array or a vector of Eigen alone.
+template <typename List>
+void pass(auto& archive, List& list)
+  requires requires { list.begin(); }
+{
+  if constexpr (requires { list.push_back(list.front()); }) {
+    archive.count(list);
+  }
+  for (auto& element : list) {
+    pass(archive, element);
   }
 }
-
-void pass(auto& archive, char& letter) { archive(letter); }
 
 void pass(auto& archive, Camera& camera) {
   pass_all(archive, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.width_px,
@@ -85,23 +92,16 @@ void pass(auto& archive, Camera& camera) {
 }
 
 void pass(auto& archive, Rigid3& pose) {
-  pass_each(archive, pose.rotation.coeffs());
-  pass_each(archive, pose.translation);
+  pass_all(archive, pose.rotation.coeffs(), pose.translation);
 }
 
 void pass(auto& archive, Similarity3& similarity) {
-  archive(similarity.scale);
-  pass_each(archive, similarity.rotation.coeffs());
-  pass_each(archive, similarity.translation);
+  pass_all(archive, similarity.scale, similarity.rotation.coeffs(), similarity.translation);
 }
 
 void pass(auto& archive, KeptCorner& corner) {
-  archive(corner.track_id);
-  pass_each(archive, corner.uv);
-  pass_each(archive, corner.in_camera);
+  pass_all(archive, corner.track_id, corner.uv, corner.in_camera);
 }
-
-void pass(auto& archive, Descriptor& descriptor) { pass_each(archive, descriptor); }
 
 void pass(auto& archive, std::pair<int, int>& pair) { pass_all(archive, pair.first, pair.second); }
 
@@ -109,40 +109,24 @@ void pass(auto& archive, MapLength& length) {
   pass_all(archive, length.keyframe, length.log_metres_per_unit, length.sigma);
 }
 
-void pass_list(auto& archive, auto& list) {
-  archive.count(list);
-  for (auto& element : list) {
-    pass(archive, element);
-  }
-}
-
 void pass(auto& archive, KeptKeyframe& keyframe) {
-  pass_all(archive, keyframe.frame, keyframe.time_s);
-  pass(archive, keyframe.camera);
-  pass_each(archive, keyframe.radial);
-  pass(archive, keyframe.world_from_camera);
-  pass_list(archive, keyframe.corners);
-  pass_list(archive, keyframe.descriptors);
+  pass_all(archive, keyframe.frame, keyframe.time_s, keyframe.camera, keyframe.radial,
+           keyframe.world_from_camera, keyframe.corners, keyframe.descriptors);
 }
 
 void pass(auto& archive, MapEdge& edge) {
-  pass_all(archive, edge.from, edge.to);
-  pass(archive, edge.from_to);
-  pass_all(archive, edge.sigma_rad, edge.sigma_translation, edge.sigma_log_scale);
+  pass_all(archive, edge.from, edge.to, edge.from_to, edge.sigma_rad, edge.sigma_translation,
+           edge.sigma_log_scale);
 }
 
 void pass(auto& archive, Loop& loop) {
-  pass(archive, static_cast<MapEdge&>(loop));
-  pass_list(archive, loop.corners);
+  pass_all(archive, static_cast<MapEdge&>(loop), loop.corners);
 }
 
 void pass(auto& archive, MapFile& file) {
-  pass_list(archive, file.channel);
-  pass_list(archive, file.map.keyframes);
-  pass_list(archive, file.map.map_from_keyframe);
-  pass_list(archive, file.map.motions);
-  pass_list(archive, file.map.loops);
-  pass_list(archive, file.map.lengths);
+  KeptMap& map = file.map;
+  pass_all(archive, file.channel, map.keyframes, map.map_from_keyframe, map.motions, map.loops,
+           map.lengths);
 }
 
 /// FNV-1a.
@@ -307,8 +291,7 @@ Status write_map_file(const std::filesystem::path& file, MapFile map) {
 
 Expected<MapFile> read_map_file(const std::filesystem::path& file) {
   STEMVO_TRY_GET(const std::string bytes, read_text_file(file, kMaxMap_MB));
-  Expected<MapFile> map = unseal(bytes).and_then(parse);
-  return map ? std::move(map) : fail(fmt::format("{}: {}", file.string(), map.error().message));
+  return named(file.string(), unseal(bytes).and_then(parse));
 }
 
 std::string sealed_map(std::string_view contents) {

@@ -8,7 +8,6 @@
 
 namespace stemvo {
 
-/// A corner of a keyframe.
 struct MapView {
   int keyframe = 0;
   int corner = 0;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "mapping/mapper.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <iterator>
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 
 #include "geometry/median.hpp"
 #include "geometry/pose_refinement.hpp"

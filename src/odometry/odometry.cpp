@@ -124,13 +124,6 @@ struct OdometryHandle::Impl {
                              ": expected a call outside of the callback, found one in it"))
                : Status();
   }
-  [[nodiscard]] Status check_few_wait() {
-    const std::lock_guard lock(results_mutex);
-    return results.size() < kMaxWaiting
-               ? Status()
-               : Status(fail("push: expected next() to take the results, found " +
-                             std::to_string(results.size()) + " that wait for it"));
-  }
   /// Why the loops take no frame.
   [[nodiscard]] Error ended() const {
     return fail(loops.has_thrown()
@@ -146,7 +139,10 @@ struct OdometryHandle::Impl {
                             const FrameHints& hints,
                             bool is_kept) {
     const std::lock_guard lock(turn);
-    STEMVO_TRY(check_few_wait());
+    if (const std::lock_guard results_lock(results_mutex); results.size() >= kMaxWaiting) {
+      return fail("push: expected next() to take the results, found " +
+                  std::to_string(results.size()) + " that wait for it");
+    }
     STEMVO_TRY(check.admit(image, order, time_s, hints));
     GivenFrame given{rgb_of(image, order), time_s, hints, {}};
     if (!is_kept) {
@@ -284,10 +280,7 @@ Expected<FrameResult> Odometry::process(const cv::Mat& image,
   if (impl_->loops.has_thrown()) {
     impl_->loops.finish();  // throws it
   }
-  if (!status) {
-    return status.error();
-  }
-  return *impl_->take();
+  return status ? *impl_->take() : Expected<FrameResult>(status.error());
 }
 
 void Odometry::reset() {

@@ -20,18 +20,15 @@ Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
   STEMVO_TRY(check_mask(mask, camera));
   Options options = given;
   options.threads = options.threads > 0 ? options.threads : cv::getNumberOfCPUs();
-  const Expected<FrameView> view = FrameView::create(camera);
-  if (!view) {
-    return fail("camera: " + view.error().message);
-  }
+  STEMVO_TRY_GET(const FrameView view, named("camera", FrameView::create(camera)));
   STEMVO_TRY_GET(Stem stem, Stem::load(options.stem, options.threads));
   // A network that cannot take this camera's images is found before work starts.
-  const Camera& seen = view->camera();
+  const Camera& seen = view.camera();
   const cv::Mat blank(seen.height_px, seen.width_px, CV_8UC1, cv::Scalar(0));
   const int zoom = stem.frame_zoom(
       choose_tracking_resolution(options.stem.tracking_resolution, options.features.method, seen));
   STEMVO_TRY(stem.apply(blank, zoom));
-  return PhasedOdometry(options, *view, mask, std::move(stem), zoom);
+  return PhasedOdometry(options, view, mask, std::move(stem), zoom);
 }
 
 PhasedOdometry::PhasedOdometry(

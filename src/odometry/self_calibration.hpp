@@ -40,7 +40,6 @@ class SelfCalibration {
   void observe(const Keyframe& keyframe,
                const Eigen::Vector2d& radial,
                const BundleOptions& options);
-  /// Rescales the run as the window is rescaled.
   void rescale(double factor, const Eigen::Vector3d& center) {
     stemvo::rescale(run_, factor, center);
   }

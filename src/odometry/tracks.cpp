@@ -32,6 +32,10 @@ std::vector<double> lengths_of(const PixelPairs& pairs, const auto& length_of) {
   return lengths;
 }
 
+std::vector<double> flows_of(const PixelPairs& pairs) {
+  return lengths_of(pairs, [](const auto& prev, const auto& cur) { return (cur - prev).norm(); });
+}
+
 /// The flow of each match that the rotation does not explain.
 std::vector<double> parallaxes_px(const Eigen::Quaterniond& rotation,
                                   const PixelPairs& pairs,
@@ -83,30 +87,22 @@ Matches common_points(const Observations& prev, const Observations& cur) {
   return pairs;
 }
 
-double median_flow_px(const PixelPairs& pairs) {
-  return median(
-      lengths_of(pairs, [](const auto& prev, const auto& cur) { return (cur - prev).norm(); }));
-}
+double median_flow_px(const PixelPairs& pairs) { return median(flows_of(pairs)); }
 
 std::optional<double> stationary_flow_px(const Observations& before,
                                          const Observations& now,
                                          double min_flow_px,
                                          int min_tracks) {
   const Matches pairs = common_points(before, now);
-  std::vector<char> stays(pairs.prev_uv.size());
-  std::vector<double> flows_px;
-  for (std::size_t i = 0; i < stays.size(); ++i) {
-    const double flow_px = (pairs.cur_uv[i] - pairs.prev_uv[i]).norm();
-    stays[i] = flow_px < min_flow_px ? 1 : 0;
-    if (stays[i] != 0) {
-      flows_px.push_back(flow_px);
-    }
-  }
+  const std::vector<double> flows_px = flows_of({pairs.prev_uv, pairs.cur_uv});
+  std::vector<char> stays(flows_px.size());
+  std::ranges::transform(flows_px, stays.begin(),
+                         [&](double px) { return static_cast<char>(px < min_flow_px); });
   const std::vector<char> all(stays.size(), 1);
   const bool is_stationary =
       std::ssize(stays) >= min_tracks &&
       2.0 * cell_votes(pairs.prev_uv, stays) > cell_votes(pairs.prev_uv, all);
-  return is_stationary ? std::optional(median(std::move(flows_px))) : std::nullopt;
+  return is_stationary ? std::optional(median(select(flows_px, stays))) : std::nullopt;
 }
 
 double median_parallax_px(const Eigen::Quaterniond& rotation,

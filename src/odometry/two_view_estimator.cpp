@@ -11,7 +11,6 @@
 #include "odometry/check_frame.hpp"
 #include "odometry/robust_models.hpp"
 #include "odometry/tracks.hpp"
-#include "stemvo/two_view.hpp"
 #include "timing/stage_timer.hpp"
 #include "try.hpp"
 
@@ -107,7 +106,7 @@ void TwoViewEstimator::score_models(const PixelPairs& pairs,
   if (is_initializing) {
     fundamental = estimate_fundamental(pairs, options_, seed_);
     if (fundamental.has_value()) {
-      result.essential = essential_from_fundamental(*fundamental, camera);
+      result.essential = camera.matrix().transpose() * *fundamental * camera.matrix();
     }
   } else {
     homography_options.max_iterations = std::min(options_.max_iterations, kRecordIterations);
@@ -177,15 +176,7 @@ Expected<TwoViewResult> estimate_two_view(std::span<const Eigen::Vector2d> prev_
   STEMVO_TRY(check_camera(camera));
   STEMVO_TRY(validate(options));
   STEMVO_TRY(check_matches(prev_uv, cur_uv));
-  MeasuredMotion motion =
-      TwoViewEstimator(options).measure({prev_uv, cur_uv}, camera, /*is_initializing=*/true);
-  return TwoViewResult{motion.state,
-                       motion.cur_from_prev,
-                       motion.model,
-                       motion.homography_ratio,
-                       motion.parallax_px,
-                       motion.is_decisive,
-                       std::move(motion.inlier_mask)};
+  return TwoViewEstimator(options).measure({prev_uv, cur_uv}, camera, /*is_initializing=*/true);
 }
 
 }  // namespace stemvo

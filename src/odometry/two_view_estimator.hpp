@@ -12,24 +12,17 @@
 #include "stemvo/camera.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/options.hpp"
-#include "stemvo/rigid3.hpp"
+#include "stemvo/two_view.hpp"
 
 namespace stemvo {
 
 /// The motion between two frames as they tell it.
-struct MeasuredMotion {
-  FrameState state = FrameState::kLost;
-  Rigid3 cur_from_prev;  ///< |translation| is 1, or 0 (stationary, rotating, lost)
-  TwoViewModel model = TwoViewModel::kNone;
+struct MeasuredMotion : TwoViewResult {
   /// The error of cur_from_prev^-1 (relative_pose_covariance); zero unless tracking.
   Matrix6d covariance = Matrix6d::Zero();
   double homography_score = 0.0;   ///< S_H
   double fundamental_score = 0.0;  ///< S_F
-  double homography_ratio = 0.0;   ///< R_H
-  double parallax_px = 0.0;        ///< median flow that no rotation explains
-  bool is_decisive = false;        ///< enough points, parallax, and no close second hypothesis
   int num_inliers = 0;
-  std::vector<char> inlier_mask;              ///< one per match
   std::vector<char> moving_mask;              ///< of an Initializer: it moves on its own
   std::optional<Eigen::Matrix3d> homography;  ///< pixels; the models that were scored
   std::optional<Eigen::Matrix3d> essential;   ///< normalised coordinates

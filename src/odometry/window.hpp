@@ -118,7 +118,6 @@ void triangulate_landmarks(Window& window, const Camera& camera, const WindowOpt
 /// Drops landmarks that a keyframe sees from behind or too far from their observation.
 void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& options);
 
-/// Drops the landmarks of these tracks.
 void drop_landmarks(Window& window, std::span<const int> track_ids);
 
 /// Puts landmarks, by track id, where they are known to be in the world, and fixes them there. Left

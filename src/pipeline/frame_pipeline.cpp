@@ -28,9 +28,7 @@ Status add_speeds(const RunRequest& request, const FrameSource& sequence, Beside
   const auto& rows = found.rows;
   WayInput input(request.config.scale.source);
   for (const dataset::SpeedRow& row : rows) {
-    if (Status status = input.add_speed(row.time_s, row.metres_per_s, row.sigma); !status) {
-      return fail("--speed: " + status.error().message);
-    }
+    STEMVO_TRY(named("--speed", input.add_speed(row.time_s, row.metres_per_s, row.sigma)));
   }
   beside.ways = input.take(std::numeric_limits<double>::infinity());
   if (beside.ways.empty()) {

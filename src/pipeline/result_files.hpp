@@ -3,9 +3,7 @@
 
 #include <array>
 #include <cstddef>
-#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -15,7 +13,6 @@
 #include "evaluation/trajectory.hpp"
 #include "html/page.hpp"
 #include "odometry/phased_odometry.hpp"
-#include "odometry/whole_map.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/run.hpp"
 #include "report/run_page.hpp"

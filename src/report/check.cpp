@@ -89,8 +89,7 @@ const Json* find_metric(const Json& root, const std::string& key) {
 
 /// The result's folder stands for its metrics.json.
 std::filesystem::path metrics_file(const std::filesystem::path& given) {
-  std::error_code none;
-  return std::filesystem::is_directory(given, none) ? given / "metrics.json" : given;
+  return is_folder(given) ? given / "metrics.json" : given;
 }
 
 Expected<std::vector<ThresholdResult>> read_baseline(const std::filesystem::path& file,
@@ -192,8 +191,7 @@ Expected<std::vector<ThresholdResult>> check_metrics(const CheckRequest& request
 }
 
 bool all_passed(const std::vector<ThresholdResult>& results) {
-  return std::all_of(results.begin(), results.end(),
-                     [](const ThresholdResult& r) { return r.passed; });
+  return std::ranges::all_of(results, &ThresholdResult::passed);
 }
 
 std::string format_check_table(const std::vector<ThresholdResult>& results) {
@@ -205,8 +203,7 @@ std::string format_check_table(const std::vector<ThresholdResult>& results) {
     table.add({result.key, has_problem ? "-" : shown(result), has_problem ? "-" : bound_of(result),
                result.passed ? "ok" : "FAILED"});
   }
-  const auto failed = std::count_if(results.begin(), results.end(),
-                                    [](const ThresholdResult& r) { return !r.passed; });
+  const auto failed = std::ranges::count(results, false, &ThresholdResult::passed);
   const std::string summary =
       failed == 0 ? fmt::format("all {} bounds kept\n", results.size())
                   : fmt::format("{} of {} bounds not kept\n", failed, results.size());

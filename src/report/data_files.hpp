@@ -11,7 +11,6 @@
 
 #include <Eigen/Core>
 
-#include "evaluation/trajectory.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/odometry.hpp"
 

@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
-#include <optional>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -97,13 +95,10 @@ void cut(PoseFile& file, const FrameRange& range) {
   }
 }
 
-/// Nullopt: all of both, line by line.
-Expected<std::optional<Pairs>> pair_poses(const PoseFile& estimate,
-                                          const PoseFile& truth,
-                                          double tolerance_s) {
+Expected<Pairs> pair_poses(const PoseFile& estimate, const PoseFile& truth, double tolerance_s) {
   if (estimate.timestamps_s.empty() || truth.timestamps_s.empty()) {
     if (estimate.poses.size() == truth.poses.size()) {
-      return std::nullopt;
+      return Pairs{estimate.poses, truth.poses};
     }
     return fail(fmt::format(
         "{}: expected {} poses as in {}, found {} (poses are compared line by line "
@@ -151,9 +146,8 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
     if (estimate.timestamps_s.empty() && estimate.poses.size() == num_lines) {
       cut(estimate, range);
     }
-    STEMVO_TRY_GET(const auto pairs, pair_poses(estimate, truth, request.tolerance_s));
-    const Trajectory& compared = pairs ? pairs->estimate : estimate.poses;
-    const Trajectory& with = pairs ? pairs->truth : truth.poses;
+    STEMVO_TRY_GET(const Pairs pairs, pair_poses(estimate, truth, request.tolerance_s));
+    const auto& [compared, with] = pairs;
     if (compared.size() < 2) {
       return fail(file.string() + ": expected at least 2 poses, for motions are compared, found 1");
     }

@@ -69,10 +69,6 @@ double percentile(std::vector<float>& samples, double percent, double bound) {
   return *at;
 }
 
-bool has_contrast(double low, double high) {
-  return high - low > kLeastContrast * std::max({std::abs(low), std::abs(high), 1e-20});
-}
-
 /// Image pixel u of a resizing by `factor` lies at channel pixel (u + 0.5) / factor - 0.5.
 PixelMap resized(const PixelMap& map, double factor) {
   PixelMap result;
@@ -147,8 +143,6 @@ int image_sampling_px(TrackingResolution resolution, int sampling_px) {
 
 }  // namespace
 
-ContrastNormalization::ContrastNormalization(const StemOptions& options) : options_(options) {}
-
 bool ContrastNormalization::follow_light(const cv::Mat& values) {
   const cv::Mat before = std::exchange(light_values_, light_values(values));
   if (!limits_.are_known) {
@@ -175,7 +169,7 @@ ChannelImage ContrastNormalization::apply(const Channel& channel) {
     const double margin = kMargin * (limits_.high - limits_.low);
     const double low = percentile(samples, options_.contrast_low_percent, limits_.low + margin);
     const double high = percentile(samples, options_.contrast_high_percent, limits_.high - margin);
-    if (has_contrast(low, high)) {
+    if (high - low > kLeastContrast * std::max({std::abs(low), std::abs(high), 1e-20})) {
       const double change = std::max(std::abs(low - limits_.low), std::abs(high - limits_.high));
       const bool has_jumped = !light_is_known && change > kJump * (limits_.high - limits_.low);
       const double memory = limits_.are_known && !has_jumped ? options_.contrast_memory : 0.0;

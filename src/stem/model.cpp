@@ -5,7 +5,6 @@
 #include <cmath>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 #include <opencv2/core.hpp>

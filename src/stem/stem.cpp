@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "stem/stem.hpp"
 
-#include <algorithm>
 #include <map>
 #include <numeric>
+#include <optional>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -17,7 +17,6 @@ namespace stemvo {
 namespace {
 
 using internal::FilterBank;
-using internal::HandMadeBank;
 
 /// -1 stands for the default. Error: outside the layer.
 Expected<int> choose_filter(int asked, const std::string& of, int num_filters, int default_filter) {
@@ -125,10 +124,26 @@ FilterBank of_gray(cv::Mat (*channel)(const cv::Mat& gray)) {
   };
 }
 
+struct HandMadeBank {
+  int num_filters = 1;
+  FilterBank bank;
+};
+
+/// nullopt: not a name of one.
+std::optional<HandMadeBank> hand_made_bank(const std::string& model) {
+  static const std::map<std::string, HandMadeBank> kBanks = {
+      {"gray", {1, of_gray([](const cv::Mat& gray) { return gray; })}},
+      {"input_layer", {3, input_channels}},
+      {"log", {1, of_gray(laplacian_of_gaussian)}},
+      {"census", {1, of_gray(local_contrast)}}};
+  const auto found = kBanks.find(model);
+  return found != kBanks.end() ? std::optional(found->second) : std::nullopt;
+}
+
 }  // namespace
 
-Expected<Stem> Stem::create(const StemOptions& options, bool all_filters, int num_threads) {
-  if (auto hand_made = internal::hand_made_bank(options.model)) {
+Expected<Stem> Stem::load(const StemOptions& options, int num_threads, bool all_filters) {
+  if (auto hand_made = hand_made_bank(options.model)) {
     STEMVO_TRY_GET(const int filter,
                    choose_filter(options.filter, options.model, hand_made->num_filters, 0));
     STEMVO_TRY(choose_sampling(options.sampling_px, 1, /*native_only=*/false));
@@ -184,14 +199,6 @@ Expected<std::vector<Channel>> Stem::apply_range(const cv::Mat& frame,
   return apply_enlarged(bank_, frame, first, last, zoom);
 }
 
-std::optional<HandMadeBank> internal::hand_made_bank(const std::string& model) {
-  static const std::map<std::string, HandMadeBank> kBanks = {
-      {"gray", {1, of_gray([](const cv::Mat& gray) { return gray; })}},
-      {"input_layer", {3, input_channels}},
-      {"log", {1, of_gray(laplacian_of_gaussian)}},
-      {"census", {1, of_gray(local_contrast)}}};
-  const auto found = kBanks.find(model);
-  return found != kBanks.end() ? std::optional(found->second) : std::nullopt;
-}
+bool is_hand_made(const std::string& model) { return hand_made_bank(model).has_value(); }
 
 }  // namespace stemvo

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,19 +31,10 @@ namespace internal {
 using FilterBank =
     std::function<Expected<std::vector<Channel>>(const cv::Mat& frame, int first, int last)>;
 
-struct HandMadeBank {
-  int num_filters = 1;
-  FilterBank bank;
-};
-/// nullopt: not a name of one.
-[[nodiscard]] std::optional<HandMadeBank> hand_made_bank(const std::string& model);
-
 }  // namespace internal
 
 /// Whether it names channels without a network, to compare a learned one with.
-[[nodiscard]] inline bool is_hand_made(const std::string& model) {
-  return internal::hand_made_bank(model).has_value();
-}
+[[nodiscard]] bool is_hand_made(const std::string& model);
 
 /// Filters of a layer of a network: frame in, channels out. Const and gives the same bytes whatever
 /// the number of threads. Frames are CV_8UC3 in RGB order, or CV_8UC1
@@ -57,12 +47,12 @@ class Stem {
   /// than the graph's, inputs or outputs other than 1x3xHxW or 1x1xHxW -> 1xCxhxw float, filter
   /// outside [0, C), sampling_px not a divisor of the stride.
   /// `num_threads`: of OpenCV's, that may work on a frame at a time; 0: all it has.
-  [[nodiscard]] static Expected<Stem> load(const StemOptions& options, int num_threads = 0) {
-    return create(options, /*all_filters=*/false, num_threads);
-  }
+  [[nodiscard]] static Expected<Stem> load(const StemOptions& options,
+                                           int num_threads = 0,
+                                           bool all_filters = false);
   /// The same with all filters, for `apply_all` and `apply_range` too.
   [[nodiscard]] static Expected<Stem> load_all(const StemOptions& options) {
-    return create(options, /*all_filters=*/true, 0);
+    return load(options, 0, /*all_filters=*/true);
   }
 
   [[nodiscard]] const StemInfo& info() const { return info_; }
@@ -88,9 +78,6 @@ class Stem {
  private:
   Stem(StemInfo info, internal::FilterBank bank, bool has_all)
       : info_(std::move(info)), bank_(std::move(bank)), has_all_(has_all) {}
-  [[nodiscard]] static Expected<Stem> create(const StemOptions& options,
-                                             bool all_filters,
-                                             int num_threads);
 
   StemInfo info_;
   internal::FilterBank bank_;
@@ -113,7 +100,7 @@ class ContrastNormalization {
  public:
   /// In `options.tracking_resolution`, kAuto and kInputZoomed stand for
   /// kInput: see choose_tracking_resolution.
-  explicit ContrastNormalization(const StemOptions& options);
+  explicit ContrastNormalization(const StemOptions& options) : options_(options) {}
   [[nodiscard]] ChannelImage apply(const Channel& channel);
 
  private:

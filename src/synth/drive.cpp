@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "synth/drive.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <ranges>

@@ -79,6 +79,26 @@ class RoadCurve {
   std::vector<RoadPart> parts_;
 };
 
+/// The mean around each value, weighted by how far the others are from it. At the ends the window
+/// shrinks evenly, so that a straight line stays where it is.
+template <typename T, typename Weight>
+std::vector<T> weighted_means(const std::vector<T>& values, int reach, const Weight& weight_of) {
+  const int n = static_cast<int>(values.size());
+  std::vector<T> means;
+  for (int i = 0; i < n; ++i) {
+    const int span = std::min({reach, i, n - 1 - i});
+    T sum = 0.0 * values.front();
+    double total = 0.0;
+    for (int k = -span; k <= span; ++k) {
+      const double weight = weight_of(k);
+      sum += weight * values[static_cast<std::size_t>(i + k)];
+      total += weight;
+    }
+    means.emplace_back(sum / total);
+  }
+  return means;
+}
+
 /// Camera poses and the road under them. The world is any frame in which -y is roughly up.
 struct Drive {
   RoadCurve road;

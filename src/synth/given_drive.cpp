@@ -32,22 +32,8 @@ Trajectory choose_keys(const Trajectory& poses) {
 /// Mean weighted by a Gaussian along the path.
 std::vector<Vec3> smooth(const std::vector<Vec3>& points, double sigma_m) {
   const double sigma = sigma_m / kFine_m;
-  const int n = static_cast<int>(points.size());
-  const int reach = static_cast<int>(std::ceil(3.0 * sigma));
-  std::vector<Vec3> result;
-  for (int i = 0; i < n; ++i) {
-    // At the ends the window shrinks evenly, so that a straight line stays where it is.
-    const int span = std::min({reach, i, n - 1 - i});
-    Vec3 sum = Vec3::Zero();
-    double total = 0.0;
-    for (int k = -span; k <= span; ++k) {
-      const double weight = std::exp(-0.5 * k * k / (sigma * sigma));
-      sum += weight * points[static_cast<std::size_t>(i + k)];
-      total += weight;
-    }
-    result.emplace_back(sum / total);
-  }
-  return result;
+  return weighted_means(points, static_cast<int>(std::ceil(3.0 * sigma)),
+                        [&](int k) { return std::exp(-0.5 * k * k / (sigma * sigma)); });
 }
 
 Path resample(const Path& from, double spacing_m) {
@@ -144,11 +130,6 @@ std::optional<int> nearest_home(const RoadCurve& road, int at, const Homes& home
   return home;
 }
 
-/// Moved sideways and up on to the line of an earlier knot.
-Vec3 on_line(const RoadFrame& home, const Vec3& point) {
-  return home.position + home.forward.dot(point - home.position) * home.forward;
-}
-
 class Joiner {
  public:
   Joiner(const RoadCurve& road, const Homes& homes) : road_(road), homes_(homes) {}
@@ -204,7 +185,9 @@ class Joiner {
       const double weight = share * share * (3.0 - 2.0 * share);
       const RoadFrame& home = knot_at(own, true);
       const RoadFrame& here = road_.knot(own);
-      line.add(here.position + weight * (on_line(home, here.position) - here.position),
+      const Vec3 off = here.position - home.position;
+      const Vec3 on_line = home.position + home.forward.dot(off) * home.forward;
+      line.add(here.position + weight * (on_line - here.position),
                ((1.0 - weight) * here.up + weight * home.up).normalized());
     }
     const RoadFrame& to = knot_at(end, is_joining);

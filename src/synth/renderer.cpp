@@ -39,15 +39,6 @@ Renderer::Renderer(CameraPath path,
   }
 }
 
-const Trajectory& Renderer::world_from_camera() const {
-  return std::visit([](const auto& path) -> const Trajectory& { return path.world_from_camera; },
-                    path_);
-}
-
-double Renderer::rate_hz() const {
-  return std::holds_alternative<Walk>(path_) ? options_.walk_rate_hz : kDriveRate_hz;
-}
-
 Scene Renderer::still_scene(std::size_t index) const {
   Scene scene{world_from_camera()[index].translation, to_sun_, ambient_};
   if (const auto* walk = std::get_if<Walk>(&path_)) {

@@ -42,8 +42,13 @@ class Renderer {
            std::uint64_t seed,
            const RenderOptions& options = {});
 
-  [[nodiscard]] const Trajectory& world_from_camera() const;
-  [[nodiscard]] double rate_hz() const;
+  [[nodiscard]] const Trajectory& world_from_camera() const {
+    const auto of = [](const auto& path) -> const auto& { return path.world_from_camera; };
+    return std::visit(of, path_);
+  }
+  [[nodiscard]] double rate_hz() const {
+    return std::holds_alternative<Walk>(path_) ? options_.walk_rate_hz : kDriveRate_hz;
+  }
   [[nodiscard]] RenderedFrame render(std::size_t index) const;
 
  private:

@@ -64,7 +64,7 @@ Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
     STEMVO_TRY(pipeline::check_is_no_input(drive.poses, {*options.trajectory}));
   }
   std::error_code code;
-  if (fs::exists(drive.poses, code) && !pipeline::is_folder_of(drive.sequence, "synth")) {
+  if (is_there(drive.poses) && !pipeline::is_folder_of(drive.sequence, "synth")) {
     return fail(fmt::format(
         "{}: expected poses of a rendered drive or none, found others (--name gives another name)",
         drive.poses.string()));

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numeric>
 
 #include "synth/objects.hpp"
 
@@ -14,19 +13,6 @@ namespace {
 constexpr double kSeenBehind_m = 25.0;
 constexpr double kSeenAhead_m = 170.0;
 constexpr double kMoving_m_s = 0.02;
-
-std::vector<double> calm(const std::vector<double>& arcs_m) {
-  constexpr std::ptrdiff_t kReach = 7;
-  std::vector<double> result;
-  for (std::ptrdiff_t i = 0; i < std::ssize(arcs_m); ++i) {
-    // At the ends the window shrinks evenly.
-    const auto reach = std::min({kReach, i, std::ssize(arcs_m) - 1 - i});
-    const auto begin = arcs_m.begin() + i - reach;
-    result.push_back(std::accumulate(begin, begin + 2 * reach + 1, 0.0) /
-                     static_cast<double>(2 * reach + 1));
-  }
-  return result;
-}
 
 RoadFrame turned_back(RoadFrame place) {
   place.forward = -place.forward;
@@ -60,7 +46,7 @@ class TrafficPlan {
       arcs_m_.push_back(drive.arcs_m[i] + offset.dot(road.forward));
     }
     find_stands();
-    arcs_m_ = calm(arcs_m_);
+    arcs_m_ = weighted_means(arcs_m_, 7, [](int) { return 1.0; });
     plan_leads();
   }
   [[nodiscard]] const std::vector<int>& crossings() const { return crossings_; }

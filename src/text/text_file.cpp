@@ -37,8 +37,7 @@ Error cannot(std::string_view verb, const fs::path& file, int reason) {
 
 /// Error: the place is taken by a folder, a device or another thing that a file cannot replace.
 Status check_place(const fs::path& file) {
-  std::error_code ignored;
-  if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored)) {
+  if (is_there(file) && !is_file(file)) {
     return fail(
         fmt::format("{}: expected a file to write, found {}", file.string(), kind_of(file)));
   }
@@ -47,13 +46,26 @@ Status check_place(const fs::path& file) {
 
 }  // namespace
 
-std::string_view kind_of(const fs::path& path) {
+bool is_there(const fs::path& path) {
   std::error_code ignored;
-  const fs::file_status status = fs::status(path, ignored);
-  return fs::is_regular_file(status) ? "a file"
-         : fs::is_directory(status)  ? "a folder"
-         : fs::exists(status)        ? "neither a file nor a folder"
-                                     : "nothing of that name";
+  return fs::exists(path, ignored);
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
+std::string_view kind_of(const fs::path& path) {
+  return is_file(path)     ? "a file"
+         : is_folder(path) ? "a folder"
+         : is_there(path)  ? "neither a file nor a folder"
+                           : "nothing of that name";
 }
 
 fs::path unfinished(const fs::path& file) { return fs::path(file.string() + ".unfinished"); }
@@ -61,7 +73,7 @@ fs::path unfinished(const fs::path& file) { return fs::path(file.string() + ".un
 Expected<std::string> read_text_file(const fs::path& file, int max_MB) {
   constexpr std::uintmax_t kBytesOfMB = 1000000;
   std::error_code code;
-  if (fs::exists(file, code) && !fs::is_regular_file(file, code)) {
+  if (is_there(file) && !is_file(file)) {
     return fail(fmt::format("{}: expected a file, found {}", file.string(), kind_of(file)));
   }
   const std::uintmax_t size = fs::file_size(file, code);
@@ -267,16 +279,13 @@ Expected<TimedRows<TimedRow>> read_timed_rows(const fs::path& file,
       return fail_at(file, i, fail(fmt::format("expected {}, found {} words", form, count)));
     }
     std::string_view rest = line;
-    const auto time = parse_numbers(take_word(rest), 1);
-    if (!time) {
-      return fail_at(file, i, time.error());
-    }
-    if (!rows.empty() && !(time->front() > rows.back().time_s)) {
+    STEMVO_TRY_GET(const auto time, at_line(file, i, parse_numbers(take_word(rest), 1)));
+    if (!rows.empty() && !(time.front() > rows.back().time_s)) {
       return fail_at(file, i,
                      fail(fmt::format("expected a time after {} s, found {} s",
-                                      unit_s * rows.back().time_s, unit_s * time->front())));
+                                      unit_s * rows.back().time_s, unit_s * time.front())));
     }
-    rows.push_back({time->front(), std::string(rest), i});
+    rows.push_back({time.front(), std::string(rest), i});
   }
   if (rows.empty()) {
     return fail(fmt::format("{}: expected rows of {}, found none", file.string(), form));
@@ -284,15 +293,12 @@ Expected<TimedRows<TimedRow>> read_timed_rows(const fs::path& file,
   const bool is_said =
       unit_s != 1.0 && (rows.size() == 1 || usual_step(rows) * unit_s >= usual.min_step_s);
   if (!is_said) {
-    const Expected<Unit> unit = find_unit(rows, usual);
-    if (!unit) {
-      return fail(fmt::format("{}: {}", file.string(), unit.error().message));
-    }
-    if (unit->size_s != unit_s) {
+    STEMVO_TRY_GET(const Unit unit, named(file.string(), find_unit(rows, usual)));
+    if (unit.size_s != unit_s) {
       result.note =
-          fmt::format("{}: times are taken for {}, by their steps", file.string(), unit->name);
+          fmt::format("{}: times are taken for {}, by their steps", file.string(), unit.name);
     }
-    unit_s = unit->size_s;
+    unit_s = unit.size_s;
   }
   for (TimedRow& row : rows) {
     row.time_s *= unit_s;

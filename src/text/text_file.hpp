@@ -19,6 +19,10 @@ inline constexpr int kMaxSettings_MB = 1;
 inline constexpr int kMaxFile_MB = 256;
 inline constexpr double kNanosecond_s = 1e-9;
 
+/// What cannot be seen is not there. A file: a regular one.
+[[nodiscard]] bool is_there(const std::filesystem::path& path);
+[[nodiscard]] bool is_file(const std::filesystem::path& path);
+[[nodiscard]] bool is_folder(const std::filesystem::path& path);
 /// "a file", "a folder", "nothing of that name", ..
 [[nodiscard]] std::string_view kind_of(const std::filesystem::path& path);
 
@@ -52,6 +56,15 @@ void add_line(std::vector<std::string>& lines, std::string line);
 [[nodiscard]] Error fail_at(const std::filesystem::path& file,
                             std::size_t index,
                             const Error& error);
+/// An error of it begins with the file and the line, counted from 0; or with its `owner`.
+template <typename T>
+Expected<T> at_line(const std::filesystem::path& file, std::size_t index, Expected<T> result) {
+  return result ? std::move(result) : fail_at(file, index, result.error());
+}
+template <typename T>
+Expected<T> named(const std::string& owner, Expected<T> result) {
+  return result ? std::move(result) : fail(owner + ": " + result.error().message);
+}
 
 struct TimedRow {
   double time_s = 0.0;

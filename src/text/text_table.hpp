@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace stemvo {
@@ -14,7 +15,7 @@ class TextTable {
   explicit TextTable(std::string alignment) : alignment_(std::move(alignment)) {}
 
   /// At most as many cells as columns.
-  void add(std::vector<std::string> cells);
+  void add(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
   void rule() { rows_.emplace_back(); }
   [[nodiscard]] std::string str() const;
 

@@ -69,18 +69,11 @@ StageRecorder::StageRecorder() : stages_(kNumStages) {
   STEMVO_CHECK(active_.compare_exchange_strong(none, this), "one run at a time is timed");
 }
 
-StageRecorder::~StageRecorder() { active_.store(nullptr, std::memory_order_release); }
-
 void StageRecorder::add(Stage stage, double wall_ms, double cpu_ms) {
   const std::lock_guard lock(mutex_);
   Samples& samples = stages_[static_cast<std::size_t>(stage)];
   samples.wall_ms.push_back(wall_ms);
   samples.cpu_ms += cpu_ms;
-}
-
-double StageRecorder::cpu_ms(Stage stage) const {
-  const std::lock_guard lock(mutex_);
-  return stages_[static_cast<std::size_t>(stage)].cpu_ms;
 }
 
 TimingReport StageRecorder::report() const {

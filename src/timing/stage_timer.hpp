@@ -57,14 +57,13 @@ struct TimingReport {
 class StageRecorder {
  public:
   StageRecorder();
-  ~StageRecorder();
+  ~StageRecorder() { active_.store(nullptr, std::memory_order_release); }
   StageRecorder(const StageRecorder&) = delete;
   StageRecorder& operator=(const StageRecorder&) = delete;
 
   [[nodiscard]] static StageRecorder* active() { return active_.load(std::memory_order_acquire); }
 
   void add(Stage stage, double wall_ms, double cpu_ms);
-  [[nodiscard]] double cpu_ms(Stage stage) const;
   /// Covers everything so far; `fps`, `num_frames` and `num_threads` are the caller's to fill in.
   [[nodiscard]] TimingReport report() const;
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Faults that any file may have, of each file that the program reads. What is wrong with one kind
 // of file only is with the tests of its reader.
-#include <unistd.h>
-
 #include "support/program_test.hpp"
 #include "support/test.hpp"
 #include "support/tiny_stem.hpp"
@@ -34,11 +32,6 @@ void expect_refused(const std::vector<Case>& cases) {
 /// A name and what it does to a file.
 using Fault = std::pair<std::string, std::function<void(const fs::path&)>>;
 
-std::string replace_first(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  return at == text.npos ? to : text.replace(at, from.size(), to);
-}
-
 /// `number`: one of the file's, as it stands there.
 std::vector<Fault> faults(const std::string& number) {
   const auto with = [](const auto& change) {
@@ -46,6 +39,12 @@ std::vector<Fault> faults(const std::string& number) {
   };
   const auto with_number = [&](const std::string& text) {
     return with([=](const std::string& whole) { return replace_first(whole, number, text); });
+  };
+  const auto link_to = [](const char* target) {
+    return [target](const fs::path& file) {
+      fs::remove(file);
+      fs::create_symlink(target, file);
+    };
   };
   return {
       {"cut", with([](const std::string& whole) { return whole.substr(0, whole.size() / 2); })},
@@ -71,16 +70,8 @@ std::vector<Fault> faults(const std::string& number) {
          fs::create_directory(file);
        }},
       {"missing", [](const fs::path& file) { fs::remove(file); }},
-      {"link to nowhere",
-       [](const fs::path& file) {
-         fs::remove(file);
-         fs::create_symlink("none", file);
-       }},
-      {"device",
-       [](const fs::path& file) {
-         fs::remove(file);
-         fs::create_symlink("/dev/zero", file);
-       }},
+      {"link to nowhere", link_to("none")},
+      {"device", link_to("/dev/zero")},
       {"unreadable",
        [](const fs::path& file) {
          ::geteuid() == 0 ? static_cast<void>(fs::remove(file))

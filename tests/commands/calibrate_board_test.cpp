@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Photos of a chessboard become a camera file that a run takes.
-#include <nlohmann/json.hpp>
-
 #include "support/program_test.hpp"
 #include "support/rendered_board.hpp"
 #include "support/test.hpp"
@@ -28,6 +26,11 @@ class CalibrateBoard : public ::testing::Test {
       cv::imwrite(files_.back(), photographer.photograph(print, 0.5, random));
     }
   }
+  ProgramResult calibrate(const std::string& input,
+                          const Words& more = {},
+                          const std::string& board = "7x5:0.03") const {
+    return run_stemvo({"calibrate", "--board", board, input, "--out", camera_}, more);
+  }
   void expect_camera(const ProgramResult& result) const {
     ASSERT_EQ(result.exit_code, 0) << result.err;
     const Json json = Json::parse(result.out, nullptr, false);
@@ -47,34 +50,25 @@ class CalibrateBoard : public ::testing::Test {
 };
 
 TEST_F(CalibrateBoard, PhotosAndVideosMakeACameraThatARunTakes) {
-  expect_camera(
-      run_stemvo({"calibrate", "--board", "7x5:0.03", photos_, "--out", camera_, "--json"}));
+  expect_camera(calibrate(photos_, {"--json"}));
   const ProgramResult ran =
       succeeded(run_stemvo({"run", photos_, "--camera", camera_, "--out", folder_ / "out"}));
   EXPECT_THAT(ran.err, HasSubstr("30 frames per second are taken for granted"));
   const std::string video = folder_ / "photos.avi";
   write_video(video, 10.0, files_);
-  expect_camera(
-      run_stemvo({"calibrate", "--board", "7x5:0.03", video, "--out", camera_, "--json"}));
-  const ProgramResult said =
-      run_stemvo({"calibrate", "--board", "7x5:0.03", photos_, "--out", camera_});
-  EXPECT_THAT(said.out,
+  expect_camera(calibrate(video, {"--json"}));
+  EXPECT_THAT(calibrate(photos_).out,
               AllOf(HasSubstr("8 pictures, 8 with the board"), HasSubstr("photograph next:"),
                     HasSubstr("camera.yaml"), HasSubstr("camera_coverage.png")));
 }
 
 TEST_F(CalibrateBoard, WhatCannotBeIsOneLine) {
-  expect_error(run_stemvo({"calibrate", "--board", "7x5", photos_, "--out", camera_}), 1,
+  expect_error(calibrate(photos_, {}, "7x5"), 1,
                {"--board: expected COLUMNSxROWS:SQUARE_M", "found '7x5'"});
-  expect_error(run_stemvo({"calibrate", "--board", "7x5:0.03", photos_, "--out", camera_,
-                           "--camera", camera_}),
-               2, {"--board", "--camera"});
-  expect_error(run_stemvo({"calibrate", "--quiet", "--board", "charuco:7x5:0.03:0.02:NONE", photos_,
-                           "--out", camera_}),
-               1, {"expected a dictionary from DICT_4X4_50", "found 'NONE'"});
-  expect_error(run_stemvo({"calibrate", "--quiet", "--board", "7x5:0.03", folder_ / "none", "--out",
-                           camera_}),
-               1, {"none: expected a folder of images"});
+  expect_error(calibrate(photos_, {"--camera", camera_}), 2, {"--board", "--camera"});
+  expect_error(calibrate(photos_, {"--quiet"}, "charuco:7x5:0.03:0.02:NONE"), 1,
+               {"expected a dictionary from DICT_4X4_50", "found 'NONE'"});
+  expect_error(calibrate(folder_ / "none", {"--quiet"}), 1, {"none: expected a folder of images"});
 }
 
 }  // namespace

@@ -1,22 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <nlohmann/json.hpp>
-
 #include "evaluation/trajectory.hpp"
 #include "support/program_test.hpp"
 #include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-/// As many lines of a rendered drive's file as there are images.
-std::string first_ten_lines(const fs::path& file) {
-  const std::string text = read_file(file);
-  std::size_t end = 0;
-  for (int i = 0; i < 10; ++i) {
-    end = text.find('\n', end) + 1;
-  }
-  return text.substr(0, end);
-}
 
 /// Ten rendered frames as a folder of images; each test breaks them in its own way.
 class ImageFolderRun : public DriveCopy {
@@ -47,9 +35,11 @@ TEST_F(ImageFolderRun, NamesTheFolderAndTheCameraFile) {
   const ProgramResult result =
       run({"--gt", folder_ / "poses/00.txt", "--frames", "2:9"});  // 60 poses, 10 images
   expect_error(result, 1, {"00.txt", "10 images", "60 poses"});
-  write_file(folder_ / "ten.txt", first_ten_lines(folder_ / "poses/00.txt"));
+  Trajectory ten = read_kitti_trajectory(folder_ / "poses/00.txt").value();
+  ten.resize(10);
+  ASSERT_TRUE(write_kitti_trajectory(folder_ / "ten.txt", ten));
   succeeded(run({"--gt", folder_ / "ten.txt", "--frames", "2:9"}));
-  const auto metrics = nlohmann::json::parse(read_file(out_ + "/metrics.json"));
+  const auto metrics = metrics_of(out_);
   EXPECT_EQ(metrics.at("sequence"), "my images");
   EXPECT_EQ(metrics.at("frames"), 7);
   EXPECT_EQ(metrics.at("scale_source"), "none");

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <regex>
 
-#include <nlohmann/json.hpp>
-
 #include "support/program_test.hpp"
 #include "support/test.hpp"
 #include "support/tiny_stem.hpp"
@@ -35,9 +33,6 @@ class JsonOutput : public ::testing::Test {
     Json json = Json::parse(result.out, nullptr, /*allow_exceptions=*/false);
     EXPECT_TRUE(json.is_object()) << arguments.front() << ": " << result.out;
     return json;
-  }
-  [[nodiscard]] Json file(const std::string& name) const {
-    return Json::parse(read_file(folder_ / name), nullptr, false);
   }
 
   TempFolder folder_;
@@ -87,7 +82,7 @@ TEST_F(JsonOutput, HoldsWhatTheFileHolds) {
   EXPECT_EQ(json["interrupted"], false);
   json.erase("out_dir");
   json.erase("interrupted");
-  EXPECT_EQ(json, file("out/metrics.json"));
+  EXPECT_EQ(json, metrics_of(out));
 }
 
 TEST_F(JsonOutput, BoundThatIsPassedIsInTheDocument) {

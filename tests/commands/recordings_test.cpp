@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include <nlohmann/json.hpp>
-
 #include "dataset/video_stream.hpp"
 #include "evaluation/trajectory.hpp"
+#include "support/matchers.hpp"
 #include "support/program_test.hpp"
-#include "support/shared_data.hpp"
 #include "support/test.hpp"
 
 namespace stemvo {
@@ -23,16 +21,10 @@ class RecordingsRun : public DriveCopy {
     return run_stemvo({"run", input, "--out", out_}, more);
   }
   std::string poses() const { return read_file(out_ + "/trajectory_kitti.txt"); }
-  nlohmann::json metrics() const {
-    return nlohmann::json::parse(read_file(out_ + "/metrics.json"));
-  }
   std::string write_video() const {
     const std::string file = folder_ / "drive.avi";
-    std::vector<fs::path> images;
-    for (int i = 0; i < kNumFrames; ++i) {
-      images.push_back(image(i));
-    }
-    test::write_video(file, 10.0, images);
+    const std::set<fs::path> images(fs::directory_iterator(sequence_ / "image_2"), {});
+    test::write_video(file, 10.0, {images.begin(), images.end()});
     return file;
   }
 
@@ -40,39 +32,33 @@ class RecordingsRun : public DriveCopy {
 };
 
 TEST_F(RecordingsRun, AVideoWithTruthByTime) {
-  std::string truth;
-  const auto true_poses = read_kitti_trajectory(folder_ / "poses/00.txt");
+  Trajectory truth = read_kitti_trajectory(folder_ / "poses/00.txt").value();
+  truth.resize(kNumFrames);
+  std::vector<double> times_s;
   for (int i = 0; i < kNumFrames; ++i) {
-    const Rigid3& pose = (*true_poses)[static_cast<std::size_t>(i)];
-    const Eigen::Quaterniond q(pose.rotation);
-    truth += fmt::format("{} {} {} {} {} {} {} {}\n", 0.1 * i, pose.translation.x(),
-                         pose.translation.y(), pose.translation.z(), q.x(), q.y(), q.z(), q.w());
+    times_s.push_back(0.1 * i);
   }
-  write_file(folder_ / "truth.txt", truth);
+  ASSERT_TRUE(write_tum_trajectory(folder_ / "truth.txt", times_s, truth));
   const std::string video = write_video();
   const ProgramResult result =
       succeeded(run(video, {"--camera", camera_, "--gt", folder_ / "truth.txt", "--pictures", "5",
                             "--threads", "2"}));
   EXPECT_THAT(result.err, HasSubstr("input: video drive, frames of 620x188 pixels"));
   EXPECT_THAT(result.err, HasSubstr("ground truth for 12 of 12 frames"));
-  EXPECT_EQ(metrics().at("frames"), kNumFrames);
-  EXPECT_LT(metrics().at("ate_rmse_m").at("sim3").get<double>(), 0.5);
+  EXPECT_EQ(metrics_of(out_).at("frames"), kNumFrames);
+  EXPECT_LT(metrics_of(out_).at("ate_rmse_m").at("sim3").get<double>(), 0.5);
   EXPECT_TRUE(fs::exists(out_ + "/pictures/000010.png"));
   const std::string first = poses();
   succeeded(run(video, {"--camera", camera_, "--threads", "1"}));
   EXPECT_EQ(poses(), first) << "threads change nothing";
   succeeded(run(video, {"--camera", camera_, "--frames", "2:7"}));
-  EXPECT_EQ(metrics().at("frames"), 5);
+  EXPECT_EQ(metrics_of(out_).at("frames"), 5);
 }
 
 TEST_F(RecordingsRun, AVideoWithTooFewTruePosesIsRefusedBeforeTheRun) {
   const std::string video = write_video();
-  std::string truth;
-  for (int i = 0; i < kNumFrames - 1; ++i) {
-    truth += fmt::format("1 0 0 0 0 1 0 0 0 0 1 {}\n", i);
-  }
   const std::string file = folder_ / "truth.txt";
-  write_file(file, truth);
+  write_file(file, pose_lines(kNumFrames - 1));
   const ProgramResult result = run(video, {"--camera", camera_, "--gt", file});
   expect_error(result, 1, {"truth.txt: expected a pose for each of 12 frames", "found 11 poses"});
   EXPECT_FALSE(fs::exists(out_));
@@ -92,7 +78,7 @@ TEST_F(RecordingsRun, AVideoThatIsCutOff) {
   EXPECT_THAT(half.err, Not(HasSubstr("internal")));
   if (half.exit_code == 0) {
     EXPECT_THAT(half.err, HasSubstr("may be cut off"));
-    EXPECT_LT(metrics().at("frames"), kNumFrames);
+    EXPECT_LT(metrics_of(out_).at("frames"), kNumFrames);
   }
   expect_error(cut_to(0.02), 1, {"drive.avi"});
   expect_error(cut_to(0.0), 1, {"drive.avi"});

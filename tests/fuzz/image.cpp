@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Image files by the first bytes: PNG or JPEG.
-#include <algorithm>
-
 #include "fuzz_input.hpp"
 #include "io/image_file.hpp"
 

@@ -112,13 +112,11 @@ void metrics(const fs::path& out) {
   stemvo::MetricsReport report;
   report.sequence = "03";
   report.model = "default";
-  Corpus::done(stemvo::write_text_file(corpus / "without_truth",
-                                       stemvo::to_text(stemvo::metrics_document(report))));
+  corpus.text("without_truth", stemvo::to_text(stemvo::metrics_document(report)));
   report.metrics = stemvo::Metrics{};
   report.metrics->segment_lengths_m = {100.0, 200.0};
   report.camera.sigma = {2.0, 0.5, 0.25};
-  Corpus::done(stemvo::write_text_file(corpus / "with_truth",
-                                       stemvo::to_text(stemvo::metrics_document(report))));
+  corpus.text("with_truth", stemvo::to_text(stemvo::metrics_document(report)));
 }
 
 void maps(const fs::path& out) {

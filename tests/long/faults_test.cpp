@@ -37,10 +37,9 @@ class LongRun : public ::testing::Test {
   [[nodiscard]] std::ptrdiff_t num_lines(const char* name) const {
     return std::ranges::count(read_file(out_ / name), '\n');
   }
-  /// Waits for the first poses on disk.
-  void wait_for_poses() const {
-    const fs::path poses = out_ / "trajectory_kitti.txt";
-    for (int i = 0; i < 3000 && (!fs::exists(poses) || fs::is_empty(poses)); ++i) {
+  /// Waits for so many poses on disk.
+  void wait_for_poses(std::ptrdiff_t count) const {
+    for (int i = 0; i < 3000 && num_lines("trajectory_kitti.txt") < count; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
   }
@@ -54,9 +53,7 @@ class LongRun : public ::testing::Test {
 TEST_F(LongRun, HasItsFramesOnDiskWhileItRuns) {
   RunningProgram program(STEMVO_PROGRAM, arguments());
   constexpr std::ptrdiff_t kEnough = 20;
-  for (int i = 0; i < 3000 && num_lines("trajectory_kitti.txt") < kEnough; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
+  wait_for_poses(kEnough);
   program.send(SIGKILL);
   EXPECT_EQ(program.wait().exit_code, 128 + SIGKILL) << "the run was over too soon to tell";
   const std::ptrdiff_t num_poses = num_lines("trajectory_kitti.txt");
@@ -71,7 +68,7 @@ TEST_F(LongRun, HasItsFramesOnDiskWhileItRuns) {
 
 TEST_F(LongRun, ASecondProcessIsRefusedUntilTheFirstIsGone) {
   RunningProgram first(STEMVO_PROGRAM, arguments());
-  wait_for_poses();
+  wait_for_poses(1);
   const Words channel = {"channel", drive_.string(), "--out", out_.string()};
   expect_error(run_stemvo(arguments()), 1, {out_.string(), "no other stemvo writes to"});
   expect_error(run_stemvo(channel), 1, {out_.string(), "no other stemvo writes to"});
@@ -84,7 +81,7 @@ TEST_F(LongRun, ASecondProcessIsRefusedUntilTheFirstIsGone) {
 TEST(SameBytes, TwoRunsAndAnyNumberOfThreadsGiveTheSameBytes) {
   const TempFolder folder;
   const std::string sequence = rendered_drive() / "sequences/00";
-  std::vector<std::vector<std::string>> variants = {{}};
+  std::vector<Words> variants = {{}};
   for (int round = 0; round < 3; ++round) {
     for (const char* threads : {"1", "2", "4"}) {
       variants.push_back({"--threads", threads});
@@ -93,8 +90,7 @@ TEST(SameBytes, TwoRunsAndAnyNumberOfThreadsGiveTheSameBytes) {
   std::string first;
   for (std::size_t i = 0; i < variants.size(); ++i) {
     const std::string out = folder / std::to_string(i);
-    variants[i].insert(variants[i].begin(), {"run", sequence, "--out", out});
-    succeeded(run_stemvo(variants[i]));
+    succeeded(run_stemvo({"run", sequence, "--out", out}, variants[i]));
     const std::string bytes =
         read_file(out + "/trajectory_kitti.txt") + read_file(out + "/trajectory_tum.txt");
     first = i == 0 ? bytes : first;

@@ -3,7 +3,6 @@
 // beside the image's own turn.
 #include "dataset/frame_source.hpp"
 #include "stemvo/odometry.hpp"
-#include "support/run_program.hpp"
 #include "support/test.hpp"
 #include "synth/synth.hpp"
 

@@ -13,11 +13,11 @@ namespace {
 /// 90 degrees to either side at 7 m/s, radius 15 m and more.
 StateDrive bends() {
   StateDrive drive;
-  Rigid3 pose;
-  for (int i = 0; i < 220; ++i) {
-    drive.world_from_camera.push_back(pose);
+  for (int i = 0; i < 219; ++i) {
     const double curvature = std::sin(2.0 * std::numbers::pi * 0.7 * i / 75.0) / 15.0;
-    pose = pose * Rigid3(so3_exp({0.0, 0.7 * curvature, 0.0}), {0.0, 0.0, 0.7});
+    drive.world_from_camera.push_back(
+        drive.world_from_camera.back() *
+        Rigid3(so3_exp({0.0, 0.7 * curvature, 0.0}), {0.0, 0.0, 0.7}));
   }
   return drive;
 }

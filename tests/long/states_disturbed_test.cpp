@@ -11,12 +11,13 @@ namespace {
 class Disturbed : public ::testing::Test {
  protected:
   /// A copy of the drive that may be changed.
-  void copy(const std::string& name, const StateDrive& drive) {
+  StateDrive copied(const std::string& name, const StateDrive& drive) {
     const fs::path from = rendered_along(name, drive);
     sequence_ = folder_.path() / "sequences" / "00";
     fs::create_directories(sequence_.parent_path());
     fs::copy(from, sequence_, fs::copy_options::recursive);
     num_frames_ = drive.world_from_camera.size();
+    return drive;
   }
   [[nodiscard]] fs::path image_file(int frame) const { return sequence_ / image_name(frame); }
   void change(int from, int to, const std::function<void(int, cv::Mat&)>& edit) const {
@@ -81,8 +82,7 @@ std::function<void(int, cv::Mat&)> darkened(double light) {
 }
 
 TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
-  const StateDrive drive = steady_drive();
-  copy("steady", drive);
+  const StateDrive drive = copied("steady", steady_drive());
   const int begin = 30;
   const int end = 34;
   change(begin, end, darkened(0.002));
@@ -102,8 +102,7 @@ TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
 
 // Five gray levels of contrast under noise of one: contrast normalization makes an image of them.
 TEST_F(Disturbed, AFewDimFramesAreFollowed) {
-  const StateDrive drive = steady_drive();
-  copy("steady", drive);
+  const StateDrive drive = copied("steady", steady_drive());
   change(30, 34, darkened(0.02));
   const StateRun result = run();
   result.expect_states(30, 60, {"tracking"});
@@ -111,16 +110,13 @@ TEST_F(Disturbed, AFewDimFramesAreFollowed) {
 }
 
 TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
-  const StateDrive drive = standing_drive();
-  copy("standing", drive);
+  const StateDrive drive = copied("standing", standing_drive());
   const Passing passing(drive.event_begin + 2, 35, kImage);
   change(drive.event_begin + 2, drive.event_end,
          [&](int i, cv::Mat& image) { passing.draw(i, image); });
   const StateRun result = run();
   result.expect_states(drive.event_begin, drive.event_end, {"stationary"});
-  const auto begin = static_cast<std::size_t>(drive.event_begin);
-  const auto end = static_cast<std::size_t>(drive.event_end);
-  const Rigid3 moved = result.poses[begin].inverse() * result.poses[end - 1];
+  const Rigid3 moved = result.motion(drive.event_begin, drive.event_end - 1);
   EXPECT_LE(moved.translation.norm(), 0.02);  // measured, not held: 0.2 % of a depth of 10 m
   const int num_frames = static_cast<int>(result.poses.size());
   expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
@@ -128,8 +124,7 @@ TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
 }
 
 TEST_F(Disturbed, WhoStandsOpensNoMapOnWhatHidesTheWorld) {
-  const StateDrive drive = standing_drive();
-  copy("standing", drive);
+  const StateDrive drive = copied("standing", standing_drive());
   const int begin = drive.event_begin + 2;
   const Passing passing(begin, 80, kImage, {1.2, 1.0});
   change(begin, drive.event_end, [&](int i, cv::Mat& image) { passing.draw(i, image); });
@@ -137,15 +132,13 @@ TEST_F(Disturbed, WhoStandsOpensNoMapOnWhatHidesTheWorld) {
   const int num_frames = static_cast<int>(result.poses.size());
   result.expect_states(drive.event_begin, num_frames,
                        {"stationary", "lost", "low_parallax", "rotating", "tracking"});
-  const Rigid3 moved = result.poses[static_cast<std::size_t>(drive.event_begin)].inverse() *
-                       result.poses[static_cast<std::size_t>(drive.event_end) - 1];
+  const Rigid3 moved = result.motion(drive.event_begin, drive.event_end - 1);
   EXPECT_LE(moved.translation.norm(), 0.02);  // 8.4 by a map on what passes
   expect_accurate(result.poses, drive, drive.event_end + 3, num_frames, 0.05, 0.3 * kDeg);
 }
 
 TEST_F(Disturbed, WhoDrivesGoesOnWhateverPassesBy) {
-  const StateDrive drive = steady_drive();
-  copy("steady", drive);
+  const StateDrive drive = copied("steady", steady_drive());
   const int begin = 15;
   const int end = 45;
   const Passing passing(begin, 26, kImage);

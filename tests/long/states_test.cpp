@@ -44,15 +44,10 @@ StateRun run_event(const std::string& name,
   return result;
 }
 
-Rigid3 motion_between(const StateRun& result, int from, int to) {
-  return result.poses.at(static_cast<std::size_t>(from)).inverse() *
-         result.poses.at(static_cast<std::size_t>(to));
-}
-
 TEST(States, TurningOnTheSpot) {
   const StateDrive drive = turning_drive();
   const StateRun result = run_event("turning", drive, "rotating", drive.event_end - 1);
-  const Rigid3 turned = motion_between(result, drive.event_begin - 1, drive.event_end - 1);
+  const Rigid3 turned = result.motion(drive.event_begin - 1, drive.event_end - 1);
   EXPECT_NEAR(turned.angle_rad(), 16 * kTurnPerFrame_rad, 0.4 * kDeg);
   EXPECT_LE(turned.translation.norm(), 0.03);  // 0.2 % of a depth of 15 m
 }

@@ -40,9 +40,6 @@ class Times : public NeedsClips {
     const auto last = static_cast<double>(clip_->size() - 1);
     return (clip_->time_s(clip_->size() - 1) - clip_->time_s(0)) / last;
   }
-  static PixelOrder order_of(const cv::Mat& image) {
-    return image.channels() == 1 ? PixelOrder::kGray : PixelOrder::kRgb;
-  }
   [[nodiscard]] Outcome run(const std::vector<GivenFrame>& frames) const {
     Odometry odometry = Odometry::create(clip_->camera).value();
     Trajectory estimate;
@@ -50,7 +47,8 @@ class Times : public NeedsClips {
     Outcome outcome;
     for (const GivenFrame& given : frames) {
       const cv::Mat image = clip_->read(given.index).value();
-      const FrameResult frame = odometry.process(image, order_of(image), given.time_s).value();
+      const PixelOrder order = image.channels() == 1 ? PixelOrder::kGray : PixelOrder::kRgb;
+      const FrameResult frame = odometry.process(image, order, given.time_s).value();
       estimate.push_back(frame.world_from_camera);
       truth.push_back(clip_->ground_truth->poses[given.index]);
       outcome.inliers += frame.num_inliers / static_cast<double>(frames.size());

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <nlohmann/json.hpp>
-
 #include "support/kitti_clips.hpp"
 #include "support/state_runs.hpp"
 #include "support/test.hpp"
@@ -32,9 +30,7 @@ TEST_F(SecondVisit, BeginsWhereItBegan) {
     const auto done = run_stemvo(
         {"run", clip, "--frames", frames, option, map, "--out", folder_ / "result", "--quiet"});
     EXPECT_EQ(done.exit_code, 0) << done.err;
-    return nlohmann::json::parse(read_file(folder_ / "result/metrics.json"))
-        .at("t_rel_percent")
-        .get<double>();
+    return metrics_of(folder_ / "result").at("t_rel_percent").get<double>();
   };
   EXPECT_LT(t_rel_percent("--save-map", "0:51"), 1.0);
   EXPECT_LT(t_rel_percent("--map", "0:51"), 1.2) << "the steps until the place was recognized";
@@ -66,9 +62,13 @@ class RoadOfClip : public NeedsClips {
     return run_stemvo(
         {"run", images.parent_path().string(), "--out", folder_ / "result", "--quiet"});
   }
+  /// The path is in units.
+  void expect_not_believed(const std::function<void(cv::Mat&)>& turn, double cx_px, double cy_px) {
+    EXPECT_THAT(run(turn, cx_px, cy_px).err, HasSubstr("the path is in units, not metres"));
+    EXPECT_EQ(believed(), 0.0);
+  }
   [[nodiscard]] double believed() const {
-    return nlohmann::json::parse(read_file(folder_ / "result/metrics.json"))
-        .at("road_believed_fraction");
+    return metrics_of(folder_ / "result").at("road_believed_fraction");
   }
 };
 
@@ -85,24 +85,18 @@ TEST_F(RoadOfClip, IsBelievedByTheCameraAsItIs) {
 
 TEST_F(RoadOfClip, IsNotBelievedUpsideDown) {
   const auto turn = [](cv::Mat& image) { cv::rotate(image, image, cv::ROTATE_180); };
-  const ProgramResult done = run(turn, kWidth - 1 - kCx_px, kHeight - 1 - kCy_px);
-  EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
-  EXPECT_EQ(believed(), 0.0);
+  expect_not_believed(turn, kWidth - 1 - kCx_px, kHeight - 1 - kCy_px);
 }
 
 TEST_F(RoadOfClip, IsNotBelievedByACameraOnItsSide) {
   const auto turn = [](cv::Mat& image) {
     cv::rotate(image, image, cv::ROTATE_90_COUNTERCLOCKWISE);
   };
-  const ProgramResult done = run(turn, kCy_px, kWidth - 1 - kCx_px);
-  EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
-  EXPECT_EQ(believed(), 0.0);
+  expect_not_believed(turn, kCy_px, kWidth - 1 - kCx_px);
 }
 
 TEST_F(RoadOfClip, IsNotBelievedBySoFewGrayLevels) {
-  const ProgramResult done = run([](cv::Mat& image) { image = 126 + image / 64; }, kCx_px, kCy_px);
-  EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
-  EXPECT_EQ(believed(), 0.0);
+  expect_not_believed([](cv::Mat& image) { image = 126 + image / 64; }, kCx_px, kCy_px);
 }
 
 TEST_F(RoadOfClip, KeepsItsScaleOverFramesWithoutTexture) {
@@ -166,8 +160,7 @@ TEST_F(HandHeld, ARoomHasNoRoad) {
                             folder_ / "result", "--quiet", "--frames", "0:150", "--set",
                             "scale.source=camera_height", "--set", "scale.camera_height_m=1.5"}));
   EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
-  const auto metrics = nlohmann::json::parse(read_file(folder_ / "result/metrics.json"));
-  EXPECT_LE(metrics["ate_rmse_m"]["sim3"], 0.03) << "one unit";
+  EXPECT_LE(metrics_of(folder_ / "result")["ate_rmse_m"]["sim3"], 0.03) << "one unit";
 }
 
 }  // namespace

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <nlohmann/json.hpp>
-
 #include "evaluation/trajectory.hpp"
 #include "support/kitti_clips.hpp"
 #include "support/program_test.hpp"
@@ -33,6 +31,14 @@ class OtherCameras : public NeedsClips {
 /// The hand-held camera, its frames in an order of ours.
 class Handheld : public OtherCameras {
  protected:
+  /// Of the images in folder_: metrics.json.
+  nlohmann::json expect_run(const fs::path& poses, std::size_t count) const {
+    expect_poses({folder_ / "images", "--camera", (shared_data() / "handheld/camera.yaml").string(),
+                  "--gt", poses.string(), "--set", "scale.source=none"},
+                 count);
+    return metrics_of(folder_ / "out");
+  }
+
   /// Frames first, first + step, ..; the bounds are today's figures and half as much again.
   void expect_followed(int first, int step, std::size_t count, double max_ate_m) const {
     const fs::path data = shared_data() / "handheld";
@@ -51,10 +57,7 @@ class Handheld : public OtherCameras {
       chosen += poses[from] + "\n";
     }
     write_file(folder_ / "poses.txt", chosen);
-    expect_poses({folder_ / "images", "--camera", (data / "camera.yaml").string(), "--gt",
-                  folder_ / "poses.txt", "--set", "scale.source=none"},
-                 count);
-    const auto metrics = nlohmann::json::parse(read_file(folder_ / "out/metrics.json"));
+    const auto metrics = expect_run(folder_ / "poses.txt", count);
     EXPECT_LE(metrics.at("ate_rmse_m").at("sim3").get<double>(), max_ate_m);
     EXPECT_GE(metrics.at("tracked_fraction").get<double>(), 0.97);
     if (count == images.size()) {  // the desk is seen again
@@ -83,10 +86,7 @@ class Handheld : public OtherCameras {
         ASSERT_TRUE(cv::imwrite((images / name).string(), black));
       }
     }
-    expect_poses({images, "--camera", (data / "camera.yaml").string(), "--gt",
-                  (data / "poses.txt").string(), "--set", "scale.source=none"},
-                 400);
-    const auto metrics = nlohmann::json::parse(read_file(folder_ / "out/metrics.json"));
+    const auto metrics = expect_run(data / "poses.txt", 400);
     EXPECT_GE(metrics.at("map").at("loops").get<int>(), 1);
     EXPECT_LE(metrics.at("map").at("ate_rmse_m").at("sim3").get<double>(), max_map_ate_m);
     EXPECT_EQ(column(read_file(folder_ / "out/frames.csv"), "map_id").back(), "0");

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <nlohmann/json.hpp>
-
 #include "report/evaluate_report.hpp"
 #include "support/program_test.hpp"
 #include "support/test.hpp"
@@ -12,10 +10,6 @@ constexpr const char* kTrueScale = "scale.source=ground_truth";
 
 ProgramResult run_drive(const fs::path& sequence, const std::string& out, const Words& more = {}) {
   return run_stemvo({"run", sequence.string(), "--out", out}, more);
-}
-
-nlohmann::json metrics_of(const std::string& out) {
-  return nlohmann::json::parse(read_file(out + "/metrics.json"));
 }
 
 std::ptrdiff_t count_lines(const std::string& text) {

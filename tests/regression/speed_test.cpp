@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <nlohmann/json.hpp>
-
 #include "evaluation/trajectory.hpp"
 #include "support/kitti_clips.hpp"
 #include "support/program_test.hpp"
@@ -36,7 +34,7 @@ class Speeds : public ::testing::Test {
                               "scale.source=none", "--speed", folder_ / "speeds.csv"},
                              more));
     EXPECT_THAT(run.err, HasSubstr(fmt::format(", {} speeds", poses->size() - 1)));
-    const auto metrics = nlohmann::json::parse(read_file(folder_ / "out/metrics.json"));
+    const auto metrics = metrics_of(folder_ / "out");
     EXPECT_EQ(metrics.at("scale_source"), "speed");
     EXPECT_EQ(metrics.at("alignment"), "none");
     return metrics.at("t_rel_percent").get<double>();

@@ -18,9 +18,8 @@ struct DriveSize {
 
 inline std::string image_name(int frame) { return fmt::format("image_2/{:06}.png", frame); }
 
-/// The folder for rendered drives, empty when the program is a new one. Hold its lock file.
-inline fs::path drives_folder() {
-  const fs::path base = fs::path(STEMVO_PROGRAM).parent_path() / "test_drives";
+/// Empties the folder for rendered drives when the program is a new one. Hold its lock file.
+inline void clear_old_drives(const fs::path& base) {
   const std::string built =
       std::to_string(fs::last_write_time(STEMVO_PROGRAM).time_since_epoch().count());
   if (read_file(base / "program") != built) {  // drives of an older program
@@ -31,7 +30,6 @@ inline fs::path drives_folder() {
     }
     std::ofstream(base / "program") << built;
   }
-  return base;
 }
 
 /// Renders a drive by these options of `stemvo synth`, or takes the one that is there. Returns the
@@ -42,7 +40,8 @@ inline fs::path render_once(const std::string& name, const Words& options) {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> lock(
       std::fopen((parent / "lock").c_str(), "a"), &std::fclose);
   ::flock(::fileno(lock.get()), LOCK_EX);
-  const fs::path drive = drives_folder() / name;
+  clear_old_drives(parent);
+  const fs::path drive = parent / name;
   if (!fs::exists(drive)) {
     const fs::path unfinished = parent / (name + ".unfinished");
     fs::remove_all(unfinished);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "support/drives.hpp"
-#include "support/run_program.hpp"
+#include "support/program_test.hpp"
 #include "support/shared_data.hpp"
 #include "support/test.hpp"
 

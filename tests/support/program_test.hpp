@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <nlohmann/json.hpp>
+
 #include "support/drives.hpp"
 #include "support/run_program.hpp"
 #include "support/test.hpp"
@@ -10,6 +12,11 @@ namespace stemvo {
 
 inline void write_file(const fs::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
+}
+
+/// Of a run's output folder.
+inline nlohmann::json metrics_of(const std::string& out) {
+  return nlohmann::json::parse(read_file(out + "/metrics.json"));
 }
 
 /// A camera file that says what row P2 of a rendered sequence's calib.txt does.

@@ -3,7 +3,6 @@
 
 #include "odometry/road/image.hpp"
 #include "odometry/road/model.hpp"
-#include "stem/channel.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/rigid3.hpp"
 #include "support/test.hpp"
@@ -129,8 +128,7 @@ inline Rigid3 in_units(Rigid3 motion, double metres_per_unit) {
 
 /// Belief that the unit is that long, to 3 %; nothing about the road.
 inline RoadPrior near(double metres_per_unit) {
-  RoadPrior prior{.log_scale = std::log(metres_per_unit), .log_scale_sigma = 0.03};
-  return prior;
+  return {.log_scale = std::log(metres_per_unit), .log_scale_sigma = 0.03};
 }
 
 }  // namespace stemvo::testing

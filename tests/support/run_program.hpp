@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include "support/test.hpp"
 
@@ -34,8 +33,7 @@ struct ProgramResult {
 /// A program as a child process, its output caught in files.
 class RunningProgram {
  public:
-  RunningProgram(const std::string& program, const Words& arguments)
-      : out_(capture_file("out")), err_(capture_file("err")) {
+  RunningProgram(const std::string& program, const Words& arguments) {
     std::vector<char*> argv = {const_cast<char*>(program.c_str())};
     for (const std::string& argument : arguments) {
       argv.push_back(const_cast<char*>(argument.c_str()));
@@ -63,8 +61,6 @@ class RunningProgram {
     result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     result.out = read_file(out_);
     result.err = read_file(err_);
-    std::filesystem::remove(out_);
-    std::filesystem::remove(err_);
     return result;
   }
 
@@ -72,19 +68,15 @@ class RunningProgram {
   static double seconds(const timeval& time) {
     return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
   }
-  static std::filesystem::path capture_file(const std::string& name) {
-    static int count = 0;
-    return std::filesystem::temp_directory_path() /
-           ("stemvo_" + std::to_string(::getpid()) + "_" + std::to_string(count++) + "." + name);
-  }
   static void redirect(const std::filesystem::path& file, int descriptor, int flags) {
     const int opened = ::open(file.c_str(), flags, 0600);
     ::dup2(opened, descriptor);
     ::close(opened);
   }
 
-  std::filesystem::path out_;
-  std::filesystem::path err_;
+  testing::TempFolder folder_;
+  const std::filesystem::path out_ = folder_ / "out";
+  const std::filesystem::path err_ = folder_ / "err";
   pid_t pid_ = -1;
 };
 

@@ -9,7 +9,7 @@ namespace stemvo::test {
 
 /// A drive with something in its middle that is no plain driving.
 struct StateDrive {
-  Trajectory world_from_camera;
+  Trajectory world_from_camera = Trajectory(1);
   int event_begin = 0;  ///< frames [begin, end) are the event
   int event_end = 0;
 
@@ -38,7 +38,6 @@ inline constexpr double kTurnPerFrame_rad = 2.5 * std::numbers::pi / 180.0;
 inline StateDrive stop_for(int num_frames, double yaw_rad) {
   constexpr int kNumSlow = 8;
   StateDrive drive;
-  drive.world_from_camera.emplace_back();
   drive.drive_on(40, kDriveStep_m);
   for (int k = kNumSlow - 1; k > 0; --k) {
     drive.drive(kDriveStep_m * k / kNumSlow, 0.0);
@@ -64,7 +63,6 @@ inline StateDrive turning_drive() { return stop_for(16, kTurnPerFrame_rad); }
 /// Nothing but driving, 60 frames.
 inline StateDrive steady_drive() {
   StateDrive drive;
-  drive.world_from_camera.emplace_back();
   drive.drive_on(59, kDriveStep_m);
   return drive;
 }
@@ -72,7 +70,6 @@ inline StateDrive steady_drive() {
 /// From one frame to the next in another street, and faster.
 inline StateDrive cut_drive() {
   StateDrive drive;
-  drive.world_from_camera.emplace_back();
   drive.drive_on(50, kDriveStep_m);
   drive.begin();
   drive.world_from_camera.push_back(drive.world_from_camera.back() *

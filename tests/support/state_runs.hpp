@@ -36,6 +36,10 @@ struct StateRun {
   Words roads;
   Trajectory poses;
 
+  [[nodiscard]] Rigid3 motion(int from, int to) const {
+    return poses.at(static_cast<std::size_t>(from)).inverse() *
+           poses.at(static_cast<std::size_t>(to));
+  }
   void expect_states(int from, int to, const Words& allowed) const {
     for (int i = from; i < to; ++i) {
       EXPECT_THAT(allowed, Contains(states.at(static_cast<std::size_t>(i)))) << i;

@@ -30,7 +30,6 @@ struct Scene {
   std::vector<Eigen::Vector3d> points_in_prev;
   std::vector<Eigen::Vector2d> prev_uv;
   std::vector<Eigen::Vector2d> cur_uv;
-  std::vector<char> is_outlier;
   /// Planar scenes: normal . X = distance in the previous camera.
   Eigen::Vector3d plane_normal = Eigen::Vector3d::Zero();
   double plane_distance = 0.0;
@@ -85,7 +84,6 @@ inline void add_match(const SceneOptions& options,
   scene.points_in_prev.push_back(point);
   scene.prev_uv.push_back(scene.camera.project(point) + noise());
   scene.cur_uv.push_back(outlier ? random.pixel(scene.camera) : cur + noise());
-  scene.is_outlier.push_back(outlier ? 1 : 0);
 }
 
 /// Every point is in front of both cameras and inside both images. A motion under which nothing
@@ -121,13 +119,10 @@ inline Scene make_scene(const SceneOptions& options) {
 /// H = K (R + T n^T / d) K^-1, pixels, cur_from_prev. Planar scenes only.
 inline Eigen::Matrix3d true_homography(const Scene& scene) {
   const Eigen::Matrix3d k = scene.camera.matrix();
-  Eigen::Matrix3d k_inverse;
-  k_inverse << 1.0 / k(0, 0), 0.0, -k(0, 2) / k(0, 0), 0.0, 1.0 / k(1, 1), -k(1, 2) / k(1, 1), 0.0,
-      0.0, 1.0;
   return k *
          (scene.cur_from_prev.rotation_matrix() +
           scene.cur_from_prev.translation * scene.plane_normal.transpose() / scene.plane_distance) *
-         k_inverse;
+         k.inverse();
 }
 
 }  // namespace stemvo::testing

@@ -89,6 +89,12 @@ inline std::string read_all(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
+/// The text with the first `from` replaced; `to` alone where it has none.
+inline std::string replace_first(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  return at == text.npos ? to : text.replace(at, from.size(), to);
+}
+
 /// Why it is an error; "no error" where it is none. A test that wants the value just takes it:
 /// value(), * and -> of an error throw its message.
 template <typename T>

@@ -33,13 +33,9 @@ inline const TinyStem kPadded7{
     .name = "plain_k7s2p3", .kernel = 7, .stride = 2, .padding = {3, 3, 3, 3}};
 inline const TinyStem kFixed4{.name = "fixed_k4s4"};
 
-inline std::filesystem::path tiny_stems() {
-  return std::filesystem::path(STEMVO_SOURCE_DIR) / "tests/data/stems";
-}
-
 /// The path of a model of make_models.py, as stem.model takes it.
 inline std::string tiny_model(const std::string& name) {
-  return (tiny_stems() / (name + ".onnx")).string();
+  return STEMVO_SOURCE_DIR "/tests/data/stems/" + name + ".onnx";
 }
 
 /// A model's bytes with another text under `stemvo.KEY`: of two with one key the last counts.

@@ -126,7 +126,11 @@ class BoardCalibration : public ::testing::Test {
                      image.size(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
       cv::imwrite((photos / fmt::format("{:02}.png", i)).string(), zoomed);
     }
-    return calibrate_board({photos, temp_ / "camera.yaml", parse_board(board).value(), board});
+    return calibrate_photos(board);
+  }
+  Expected<BoardReport> calibrate_photos(const std::string& board = "9x6:0.025",
+                                         const std::string& out = "camera.yaml") const {
+    return calibrate_board({temp_ / "photos", temp_ / out, parse_board(board).value(), board});
   }
   template <typename... Rest>
   BoardReport calibrate(const Rest&... rest) {
@@ -225,8 +229,7 @@ TEST_F(BoardCalibration, ABoardThatIsNamedWrongIsRefused) {
 
 TEST_F(BoardCalibration, APictureIsNotOverwritten) {
   ASSERT_TRUE(try_to_calibrate("9x6:0.025", print_chessboard({9, 6}, 0.025), 4, 0.6));
-  EXPECT_THAT(message_of(calibrate_board({temp_ / "photos", temp_ / "photos/00.png",
-                                          parse_board("9x6:0.025").value(), "9x6:0.025"})),
+  EXPECT_THAT(message_of(calibrate_photos("9x6:0.025", "photos/00.png")),
               HasSubstr("expected a file to write that is no input"));
 }
 
@@ -238,9 +241,7 @@ TEST_F(BoardCalibration, DoubtsAboutThePicturesAreSaid) {
     cv::imread(entry.path().string(), cv::IMREAD_GRAYSCALE).convertTo(deep, CV_16U, 16.0);
     cv::imwrite(entry.path().string(), deep);
   }
-  const auto report = calibrate_board(
-      {temp_ / "photos", temp_ / "camera.yaml", parse_board("9x6:0.025").value(), "9x6:0.025"});
-  EXPECT_THAT(report->warnings, Contains(HasSubstr("images of 16 bits: values from")));
+  EXPECT_THAT(calibrate_photos()->warnings, Contains(HasSubstr("images of 16 bits: values from")));
 }
 
 TEST_F(BoardCalibration, ViewsThatErrAreLeftOutAndSaid) {
@@ -291,8 +292,7 @@ TEST_F(BoardCalibration, TooFewViewsAreRefused) {
   const fs::path photos = temp_ / "photos";
   fs::create_directories(photos);
   cv::imwrite((photos / "1.png").string(), cv::Mat(480, 640, CV_8UC1, cv::Scalar(90)));
-  EXPECT_THAT(message_of(calibrate_board(
-                  {photos, temp_ / "camera.yaml", parse_board("9x6:0.025").value(), "9x6:0.025"})),
+  EXPECT_THAT(message_of(calibrate_photos()),
               HasSubstr("photos: expected at least 3 pictures with the board, found 0"));
   EXPECT_FALSE(fs::exists(temp_ / "camera.yaml"));
 }

@@ -69,9 +69,10 @@ TEST_F(ConfigLoad, TellsWhichKeysAFileSets) {
 TEST_F(ConfigLoad, UnknownKeyNamesLineAndKnownKeys) {
   EXPECT_THAT(error_of("stem:\n  model: gray\n  filtre: 3\n"),
               StartsWith(":3: stem.filtre: unknown key; known keys of stem: model, filter, "));
-  EXPECT_THAT(error_of("\nstm:\n  filter: 3\n"),
-              StartsWith(":2: stm: unknown key; known keys: input, evaluation, stem, features, "));
-  EXPECT_THAT(error_of("\nstm:\n  filter: 3\n"), EndsWith(", scale, seed, threads"));
+  EXPECT_THAT(
+      error_of("\nstm:\n  filter: 3\n"),
+      AllOf(StartsWith(":2: stm: unknown key; known keys: input, evaluation, stem, features, "),
+            EndsWith(", scale, seed, threads")));
 }
 
 TEST_F(ConfigLoad, DuplicatedKeyNamesBothLines) {

@@ -159,12 +159,10 @@ TEST_F(CameraFileTest, KalibrsChain) {
   // The camera's centre in the body: -R^T t.
   ASSERT_TRUE(file->body_from_camera);
   EXPECT_LT((file->body_from_camera->translation - Eigen::Vector3d(0, -0.5, 0)).norm(), 1e-12);
-  std::string text = kKalibr;
-  text.replace(text.find("[190.0, "), 8, "[");
-  expect_refused(text, {"camera.yaml:11: intrinsics: expected [fx, fy, cx, cy], found 3 numbers"});
-  text = kKalibr;
-  text.replace(text.find("pinhole"), 7, "omni");
-  expect_refused(text, {"camera.yaml:8: camera_model: expected one of pinhole, found 'omni'"});
+  expect_refused(replace_first(kKalibr, "[190.0, ", "["),
+                 {"camera.yaml:11: intrinsics: expected [fx, fy, cx, cy], found 3 numbers"});
+  expect_refused(replace_first(kKalibr, "pinhole", "omni"),
+                 {"camera.yaml:8: camera_model: expected one of pinhole, found 'omni'"});
 }
 
 TEST_F(CameraFileTest, OddRowsOfAMatrix) {
@@ -190,39 +188,31 @@ TEST_F(CameraFileTest, AMessageOfRos) {
   EXPECT_EQ(none->camera.distortion, Distortion::kNone);
   expect_refused(message("rational_polynomial\nd: [1]\n"), {"d: expected [k1, k2, p1, p2]"});
   expect_refused(message("plumb_bob\n"), {"d: [k1, k2, p1, p2]", "no such key"});
-  std::string text = message(five);
-  text.replace(text.find("- 520.0\n"), 8, "");
-  expect_refused(text, {"camera.yaml:16: k: expected [fx, 0, cx, 0, fy", "found 8 numbers"});
-  text = message(five);
-  text.replace(text.find("width: 640\n"), 11, "");
-  expect_refused(text, {"expected width and height, found height alone"});
+  expect_refused(replace_first(message(five), "- 520.0\n", ""),
+                 {"camera.yaml:16: k: expected [fx, 0, cx, 0, fy", "found 8 numbers"});
+  expect_refused(replace_first(message(five), "width: 640\n", ""),
+                 {"expected width and height, found height alone"});
   expect_refused(message(five) + message(five), {"not YAML: expected one document"});
 }
 
 TEST_F(CameraFileTest, FisheyesOfOpenCvAndRos) {
-  std::string text = kOpenCv;
-  text.replace(text.find("flags: 0"), 8, "fisheye_model: 1");
-  expect_refused(text, {"camera.yaml:16: distortion_coefficients: expected [k1, k2, k3, k4]"});
-  text.replace(text.find("0.001,\n       0.9"), 17, "0.001");
-  const auto fisheye = read_camera_file(folder_.file("camera.yaml", text));
+  const std::string five = replace_first(kOpenCv, "flags: 0", "fisheye_model: 1");
+  expect_refused(five, {"camera.yaml:16: distortion_coefficients: expected [k1, k2, k3, k4]"});
+  const auto fisheye = read_camera_file(
+      folder_.file("camera.yaml", replace_first(five, "0.001,\n       0.9", "0.001")));
   EXPECT_EQ(fisheye->camera.distortion, Distortion::kEquidistant);
-  text = kRos;
-  text.replace(text.find("plumb_bob"), 9, "rational_polynomial");
-  EXPECT_EQ(error_of(text), "no error");
-  text = kRos;
-  text.replace(text.find("0, 0, 0]"), 8, "0, 0, 3]");
-  expect_refused(text, {"camera.yaml:12: distortion_coefficients: expected [k1, k2, p1, p2]",
-                        "found 8 numbers"});
-  text = kRos;
-  text.replace(text.find("[520, "), 6, "[");
-  expect_refused(text, {"camera.yaml:7: camera_matrix: expected data: [fx, 0, cx", "found 8"});
+  EXPECT_EQ(error_of(replace_first(kRos, "plumb_bob", "rational_polynomial")), "no error");
+  expect_refused(
+      replace_first(kRos, "0, 0, 0]", "0, 0, 3]"),
+      {"camera.yaml:12: distortion_coefficients: expected [k1, k2, p1, p2]", "found 8 numbers"});
+  expect_refused(replace_first(kRos, "[520, ", "["),
+                 {"camera.yaml:7: camera_matrix: expected data: [fx, 0, cx", "found 8"});
 }
 
 TEST_F(CameraFileTest, FourCoefficientsWithoutAModelMayBeAFisheyes) {
   const auto warnings_of = [&](const std::string& flags, const std::string& lens) {
-    std::string text = kOpenCv;
-    text.replace(text.find("flags: 0"), 8, flags);
-    text.replace(text.find("0.001,\n       0.9"), 17, lens);
+    const std::string text =
+        replace_first(replace_first(kOpenCv, "flags: 0", flags), "0.001,\n       0.9", lens);
     const auto file = read_camera_file(folder_.file("camera.yaml", text));
     EXPECT_EQ(file->camera.distortion, Distortion::kRadialTangential) << text;
     return file->warnings;

@@ -66,9 +66,8 @@ TEST_F(DoubtfulInput, PartsOfImagesAndSkewAreRefusedByName) {
   EXPECT_EQ(error_of_camera(good + "roi: [0, 0, 640, 480]\n"), "no error");
   EXPECT_THAT(error_of_camera(good + "roi: [8, 0, 640, 480]\n"), HasSubstr(":6: roi: expected"));
   EXPECT_THAT(error_of_camera(good + "roi: 8\n"), HasSubstr("roi: expected the whole image"));
-  std::string skewed = good;
-  skewed.replace(skewed.find("520, 0"), 6, "520, 3");
-  EXPECT_THAT(error_of_camera(skewed), HasSubstr("without skew, found [520, 3, "));
+  EXPECT_THAT(error_of_camera(replace_first(good, "520, 0", "520, 3")),
+              HasSubstr("without skew, found [520, 3, "));
 }
 
 TEST_F(DoubtfulInput, TheCameraOfRectifiedImagesIsSaid) {
@@ -86,25 +85,23 @@ TEST_F(DoubtfulInput, NoLensInEveryForm) {
                            "distortion_model: plumb_bob\nd: [0, 0, 0, 0, 0]\n",
                            "distortion_model: none\nd: [0, 0, 0, 0]\n",
                            "distortion_model: ''\nd: [0.0, 0.0, 0.0, 0.0, 0.0]\n"}) {
-    const auto camera = read_camera_file(
-        temp_.file("none.yaml", std::string("width: 640\nheight: 480\nk: [520, 0, 325.5, 0, 521, "
-                                            "249.5, 0, 0, 1]\n") +
-                                    lens));
+    const std::string size =
+        "width: 640\nheight: 480\nk: [520, 0, 325.5, 0, 521, 249.5, 0, 0, 1]\n";
+    const auto camera = read_camera_file(temp_.file("none.yaml", size + lens));
     EXPECT_EQ(camera->camera.distortion_coefficients[0], 0.0);
   }
 }
 
 TEST_F(DoubtfulInput, TheRationalModelIsTakenAndWritten) {
-  std::string text = kOfRos;
-  text.replace(text.find("plumb_bob"), 9, "rational_polynomial");
-  text.replace(text.find("0.9]"), 4, "0.9, 0.1, 0.2, 0.3]");
+  const std::string text = replace_first(replace_first(kOfRos, "plumb_bob", "rational_polynomial"),
+                                         "0.9]", "0.9, 0.1, 0.2, 0.3]");
   const auto camera = read_camera_file(temp_.file("rational.yaml", text));
   EXPECT_EQ(camera->camera.distortion_coefficients,
             (std::array<double, 12>{0.2, -0.7, 0, 0.001, 0.9, 0.1, 0.2, 0.3}));
   const auto again = read_camera_file(temp_.file("ours.yaml", camera_file_text(*camera)));
   EXPECT_EQ(again->camera.distortion_coefficients, camera->camera.distortion_coefficients);
-  text.replace(text.find("0.3]"), 4, "0.3, 0, 0, 0, 0, 0.01, 0]");
-  EXPECT_THAT(error_of_camera(text), HasSubstr("found 14 numbers"));
+  EXPECT_THAT(error_of_camera(replace_first(text, "0.3]", "0.3, 0, 0, 0, 0, 0.01, 0]")),
+              HasSubstr("found 14 numbers"));
 }
 
 TEST_F(DoubtfulInput, CamerasOfColmap) {

@@ -34,13 +34,6 @@ class ImageFolderTest : public ::testing::Test {
                                         more);
   }
   std::string error_of() const { return message_of(open_source(request_)); }
-  static std::string pose_lines(int count) {
-    std::string text;
-    for (int i = 0; i < count; ++i) {  // turned by 90 degrees about y, 2 m a frame along world x
-      text += fmt::format("0 0 1 {} 0 1 0 0 -1 0 0 3\n", 2 * i);
-    }
-    return text;
-  }
 
   TempFolder temp_;
   const fs::path images_ = temp_ / "my drive";
@@ -261,10 +254,8 @@ class ImageList : public ::testing::Test {
   static std::vector<std::string> names(const fs::path& path) {
     const auto list = list_images(path);
     std::vector<std::string> result;
-    if (list) {
-      for (const fs::path& file : list->files) {
-        result.push_back(file.filename().string());
-      }
+    for (const fs::path& file : list->files) {
+      result.push_back(file.filename().string());
     }
     return result;
   }

@@ -3,7 +3,6 @@
 #include "dataset/frame_source.hpp"
 #include "support/matchers.hpp"
 #include "support/test.hpp"
-#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
@@ -29,16 +28,13 @@ class KittiSequenceTest : public ::testing::Test {
 
   fs::path image(int index) const { return folder_ / "image_2" / fmt::format("{:06}.png", index); }
   fs::path poses() const { return root_ / "poses" / "07.txt"; }
-  static std::string pose_lines(int count) {
-    std::string text;
-    for (int i = 0; i < count; ++i) {  // turned by 90 degrees about y, 2 m a frame along world x
-      text += fmt::format("0 0 1 {} 0 1 0 0 -1 0 0 3\n", 2 * i);
-    }
-    return text;
-  }
   static void write(const fs::path& file, const std::string& text) { std::ofstream(file) << text; }
   std::string open_error(const SequenceOptions& options = {}) const {
     return message_of(open_kitti(folder_, options));
+  }
+  std::string error_with(const std::string& calibration) const {
+    write(folder_ / "calib.txt", calibration);
+    return open_error();
   }
   static SequenceOptions frames(const std::string& text) {
     return {.frames = parse_frame_range(text).value()};
@@ -99,25 +95,19 @@ TEST_F(KittiSequenceTest, FolderProblems) {
 }
 
 TEST_F(KittiSequenceTest, CalibrationProblems) {
-  const fs::path file = folder_ / "calib.txt";
-  write(file, "P0: 90 0 3 0 0 90 2 0 0 0 1 0\n");
-  EXPECT_THAT(open_error(), HasSubstr("expected a row 'P2:'"));
-  write(file, "P2: 100 0 4 5 0 101 3 0 0 0 1\n");
-  EXPECT_THAT(open_error(), HasSubstr("calib.txt:1: expected 12 numbers, found 11"));
-  write(file, "P2: 0 0 4 5 0 101 3 0 0 0 1 0\n");
-  EXPECT_THAT(open_error(), HasSubstr("focal lengths of at least 1 pixel"));
-  write(file, "P2: 100 7 4 5 0 101 3 0 0 0 1 0\n");
-  EXPECT_THAT(open_error(), HasSubstr("pinhole"));
-  write(file, "corner_dist: 1.0\r\nP_rect_02: 100 0 4 5 0 101 3 0 0 0 1 0\r\n");
-  EXPECT_EQ(open_error(), "no error") << "the raw data's name, lines ended by CR LF";
+  EXPECT_THAT(error_with("P0: 90 0 3 0 0 90 2 0 0 0 1 0\n"), HasSubstr("expected a row 'P2:'"));
+  EXPECT_THAT(error_with("P2: 100 0 4 5 0 101 3 0 0 0 1\n"),
+              HasSubstr("calib.txt:1: expected 12 numbers, found 11"));
+  EXPECT_THAT(error_with("P2: 0 0 4 5 0 101 3 0 0 0 1 0\n"),
+              HasSubstr("focal lengths of at least 1 pixel"));
+  EXPECT_THAT(error_with("P2: 100 7 4 5 0 101 3 0 0 0 1 0\n"), HasSubstr("pinhole"));
+  EXPECT_EQ(error_with("corner_dist: 1.0\r\nP_rect_02: 100 0 4 5 0 101 3 0 0 0 1 0\r\n"),
+            "no error")
+      << "the raw data's name, lines ended by CR LF";
 }
 
 TEST_F(KittiSequenceTest, ImagesOfAnotherSizeThanTheRawCalibrationSaysAreRefused) {
   const std::string camera = "P_rect_02: 100 0 4 5 0 101 3 0 0 0 1 0\n";
-  const auto error_with = [&](const std::string& text) {
-    write(folder_ / "calib.txt", text);
-    return open_error();
-  };
   EXPECT_EQ(error_with("S_02: 9 7\nS_rect_02: 8.0e+00 6.0e+00\n" + camera), "no error");
   EXPECT_EQ(error_with("S_rect_03: 9 7\n" + camera), "no error") << "another camera's";
   for (const std::string& text :

@@ -26,6 +26,11 @@ class Recordings : public ::testing::Test {
     result.sequence_dir = input;
     return result;
   }
+  FrameSourceRequest with_camera(const std::string& input) const {
+    FrameSourceRequest result = request(input);
+    result.camera_file = camera("");
+    return result;
+  }
   static std::string error_of(const FrameSourceRequest& request) {
     return message_of(open_source(request));
   }
@@ -128,8 +133,7 @@ TEST_F(Recordings, TumWithinTheTolerance) {
 }
 
 TEST_F(Recordings, ListsOfImagesAreChecked) {
-  FrameSourceRequest tum = request(write_tum());
-  tum.camera_file = camera("");
+  FrameSourceRequest tum = with_camera(write_tum());
   fs::remove(temp_ / "desk/groundtruth.txt");
   const auto error_with = [&](const std::string& list) {
     (void)temp_.file("desk/rgb.txt", list);
@@ -255,8 +259,7 @@ TEST_F(Recordings, RawMotionJpegIsCountedAtTheGivenRate) {
 }
 
 TEST_F(Recordings, GrayLevelsThatAVideoLosesAreSaid) {
-  FrameSourceRequest video = request(temp_ / "gray.mkv");
-  video.camera_file = camera("");
+  FrameSourceRequest video = with_camera(temp_ / "gray.mkv");
   const auto warnings_of = [&](int type) {  // images behind one another: FFmpeg's png_pipe
     std::vector<unsigned char> png;
     cv::imencode(".png", cv::Mat(kHeight_px, kWidth_px, type, cv::Scalar(50)), png);
@@ -268,8 +271,7 @@ TEST_F(Recordings, GrayLevelsThatAVideoLosesAreSaid) {
 }
 
 TEST_F(Recordings, WhatIsNoVideoOrOfAnotherSizeIsRefused) {
-  FrameSourceRequest video = request(temp_.file("notes.mp4", "no video at all\n"));
-  video.camera_file = camera("");
+  FrameSourceRequest video = with_camera(temp_.file("notes.mp4", "no video at all\n"));
   EXPECT_THAT(error_of(video), AllOf(HasSubstr("notes.mp4"), HasSubstr("FFmpeg")));
   video.sequence_dir = write_video();
   video.camera_file = temp_.file(
@@ -289,23 +291,19 @@ TEST_F(Recordings, WhatIsMissingOrMeantIsSaid) {
   const fs::path folder = write_euroc();
   fs::remove(folder / "mav0/cam0/sensor.yaml");
   EXPECT_THAT(error_of(request(folder)), HasSubstr("cam0/sensor.yaml: cannot read"));
-  FrameSourceRequest own_camera = request(folder);
-  own_camera.camera_file = camera("");
   fs::remove_all(folder / "mav0/state_groundtruth_estimate0");  // of the body
-  EXPECT_EQ(error_of(own_camera), "no error");
-  FrameSourceRequest one = request(folder / "mav0/cam0/data/0.png");
-  cv::imwrite(one.sequence_dir.string(), frame(0));
-  one.camera_file = camera("");
-  EXPECT_THAT(error_of(one), HasSubstr("found one image; give its folder, or a quoted pattern"));
+  EXPECT_EQ(error_of(with_camera(folder)), "no error");
+  const std::string one = folder / "mav0/cam0/data/0.png";
+  cv::imwrite(one, frame(0));
+  EXPECT_THAT(error_of(with_camera(one)),
+              HasSubstr("found one image; give its folder, or a quoted pattern"));
 }
 
 TEST_F(Recordings, AFileNamedLikeAnAddressIsAFile) {
   fs::rename(write_video(), temp_ / "concat:drive.avi");
   const fs::path here = fs::current_path();
   fs::current_path(temp_.path());
-  FrameSourceRequest video = request("concat:drive.avi");
-  video.camera_file = camera("");
-  EXPECT_EQ(error_of(video), "no error");
+  EXPECT_EQ(error_of(with_camera("concat:drive.avi")), "no error");
   fs::current_path(here);
 }
 
@@ -331,10 +329,9 @@ TEST_F(Recordings, ALiveCameraHasTheClocksTimes) {
 }
 
 TEST_F(Recordings, ACameraThatIsNotThere) {
-  FrameSourceRequest live = request("camera:987");
-  EXPECT_THAT(error_of(live), HasSubstr("--camera FILE"));
-  live.camera_file = camera("");
-  EXPECT_THAT(error_of(live), AllOf(HasSubstr("/dev/video987"), HasSubstr("found none")));
+  EXPECT_THAT(error_of(request("camera:987")), HasSubstr("--camera FILE"));
+  EXPECT_THAT(error_of(with_camera("camera:987")),
+              AllOf(HasSubstr("/dev/video987"), HasSubstr("found none")));
   EXPECT_THAT(error_of(request("camera:x")), HasSubstr("camera:N"));
 }
 

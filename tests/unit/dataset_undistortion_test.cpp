@@ -237,10 +237,8 @@ TEST(Mask, WhatIsNone) {
 }
 
 TEST(Mask, GoesTheWayOfTheFrames) {
-  Camera camera = camera_of(1920, 1080);
-  camera.distortion = Distortion::kRadialTangential;
-  camera.distortion_coefficients = {-0.2, 0.05};
-  const auto view = FrameView::create(camera);
+  const auto view = FrameView::create(
+      with_lens(camera_of(1920, 1080), Distortion::kRadialTangential, {-0.2, 0.05}));
   const auto mask = make_mask({"0,900,1920,180"}, {1920, 1080});
   const cv::Mat seen = view->apply_to_mask(*mask);
   cv::Mat frame(1080, 1920, CV_8UC1, cv::Scalar(0));

@@ -24,6 +24,10 @@ ChannelImage image_of(const cv::Mat& image, double scale = 1.0, double offset_px
   return {image, {Eigen::Vector2d::Constant(scale), Eigen::Vector2d::Constant(offset_px)}};
 }
 
+Matches matches_of(FrontEnd& front_end, const ChannelImage& image, const ImageClue& clue = {}) {
+  return front_end.process(front_end.prepare(image, {}), clue);
+}
+
 double median_error_px(const Matches& matches, const Eigen::Vector2d& expected_flow) {
   std::vector<double> errors;
   for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
@@ -39,10 +43,11 @@ class FrontEndTest : public ::testing::TestWithParam<FeatureMethod> {
 
 TEST_P(FrontEndTest, FindsAKnownShiftInInputPixels) {
   const cv::Size size(480, 200);
-  const Matches none = front_end_->process(image_of(textured_image(size, {0.0, 0.0}), 2.0, 1.5));
+  const Matches none =
+      matches_of(*front_end_, image_of(textured_image(size, {0.0, 0.0}), 2.0, 1.5));
   EXPECT_TRUE(none.cur_uv.empty());
   const Matches matches =
-      front_end_->process(image_of(textured_image(size, {3.25, -1.75}), 2.0, 1.5));
+      matches_of(*front_end_, image_of(textured_image(size, {3.25, -1.75}), 2.0, 1.5));
   EXPECT_GT(matches.cur_uv.size(), 150U);
   EXPECT_LE(median_error_px(matches, {-6.5, 3.5}),
             GetParam() == FeatureMethod::kPatch || GetParam() == FeatureMethod::kKlt ? 0.15 : 1.5);
@@ -50,9 +55,10 @@ TEST_P(FrontEndTest, FindsAKnownShiftInInputPixels) {
 
 TEST_P(FrontEndTest, ABlankOrResizedImageStartsOver) {
   const cv::Mat blank(160, 320, CV_8U, cv::Scalar(90));
-  static_cast<void>(front_end_->process(image_of(textured_image({320, 160}, {0.0, 0.0}))));
-  EXPECT_LT(front_end_->process(image_of(blank)).cur_uv.size(), 20U);
-  EXPECT_TRUE(front_end_->process(image_of(textured_image({200, 100}, {0.0, 0.0}))).cur_uv.empty());
+  matches_of(*front_end_, image_of(textured_image({320, 160}, {0.0, 0.0})));
+  EXPECT_LT(matches_of(*front_end_, image_of(blank)).cur_uv.size(), 20U);
+  EXPECT_TRUE(
+      matches_of(*front_end_, image_of(textured_image({200, 100}, {0.0, 0.0}))).cur_uv.empty());
 }
 
 TEST_P(FrontEndTest, APartOfOneImageEndsTheTracksThereAndBeginsNone) {
@@ -103,13 +109,13 @@ TEST(PatchFrontEnd, FollowsTheSamePointsUnderOneIdAndForgetsRejectedOnes) {
   const cv::Size size(480, 200);
   Matches first;
   for (int i = 0; i < 2; ++i) {
-    first = front_end->process(image_of(textured_image(size, {1.0 * i, 0.0})));
+    first = matches_of(*front_end, image_of(textured_image(size, {1.0 * i, 0.0})));
   }
   std::vector<char> is_good(first.track_ids.size(), 1);
   ASSERT_GT(is_good.size(), 10U);
   is_good[3] = 0;
   front_end->remove_outliers(is_good);
-  const Matches second = front_end->process(image_of(textured_image(size, {2.0, 0.0})));
+  const Matches second = matches_of(*front_end, image_of(textured_image(size, {2.0, 0.0})));
   EXPECT_FALSE(start_of(second, first.track_ids[3]).has_value());
   int num_continued = 0;
   for (std::size_t i = 0; i < first.track_ids.size(); ++i) {
@@ -124,7 +130,7 @@ TEST(PatchFrontEnd, FollowsTheSamePointsUnderOneIdAndForgetsRejectedOnes) {
 TEST(PatchFrontEnd, ATrackThatEndedIsFoundAgainWhereItIsExpectedOrForgotten) {
   const auto front_end = create_front_end({});
   const auto show = [&](double shift_px) {
-    return front_end->process(image_of(textured_image({480, 200}, {shift_px, 0.0}), 2.0, 1.5));
+    return matches_of(*front_end, image_of(textured_image({480, 200}, {shift_px, 0.0}), 2.0, 1.5));
   };
   static_cast<void>(show(0.0));
   const Matches first = show(1.0);
@@ -165,17 +171,17 @@ TEST(PatchFrontEnd, WhatMayBeHiddenIsLookedForUntilItIsSeenAgain) {
   const cv::Mat image = textured_image({480, 200}, {0.0, 0.0});
   cv::Mat hidden = image.clone();
   hidden.colRange(0, 240).setTo(128);
-  static_cast<void>(front_end->process(image_of(image)));
-  const Matches before = front_end->process(image_of(image));
+  matches_of(*front_end, image_of(image));
+  const Matches before = matches_of(*front_end, image_of(image));
   Observations expected;
   for (std::size_t i = 0; i < before.track_ids.size(); ++i) {
     expected.push_back({before.track_ids[i], before.cur_uv[i]});
   }
   for (const cv::Mat& seen : {hidden, hidden, hidden, image}) {
-    static_cast<void>(front_end->process(image_of(seen)));
+    matches_of(*front_end, image_of(seen));
     front_end->expect_projections(expected, /*may_hide=*/true);
   }
-  const Matches after = front_end->process(image_of(image));
+  const Matches after = matches_of(*front_end, image_of(image));
   EXPECT_GT(
       std::ranges::count_if(
           expected, [&](const auto& one) { return start_of(after, one.track_id).has_value(); }),
@@ -184,7 +190,7 @@ TEST(PatchFrontEnd, WhatMayBeHiddenIsLookedForUntilItIsSeenAgain) {
 
 TEST(PatchFrontEnd, WhatIsExpectedInTheDarkIsStillTrackedFromTheLastGoodImage) {
   const auto front_end = create_front_end({});
-  const auto show = [&](const cv::Mat& image) { return front_end->process(image_of(image)); };
+  const auto show = [&](const cv::Mat& image) { return matches_of(*front_end, image_of(image)); };
   const cv::Size size(480, 200);
   static_cast<void>(show(textured_image(size, {0.0, 0.0})));
   const Matches before = show(textured_image(size, {1.0, 0.0}));
@@ -222,8 +228,8 @@ cv::Mat wide_texture(int shift_px) {
 
 TEST(PatchFrontEnd, FindsAMotionBeyondTheLevelsAskedForOneLevelUp) {
   const auto front_end = create_front_end({.klt_levels = 3});
-  static_cast<void>(front_end->process(image_of(wide_texture(0))));
-  const Matches far = front_end->process(image_of(wide_texture(60)));
+  matches_of(*front_end, image_of(wide_texture(0)));
+  const Matches far = matches_of(*front_end, image_of(wide_texture(60)));
   EXPECT_GT(far.cur_uv.size(), 100U);
   EXPECT_LT(median_error_px(far, {-60.0, 0.0}), 0.05);
 }
@@ -232,9 +238,9 @@ TEST(PatchFrontEnd, LooksAsFarOnAsTheIntervalIsLong) {
   const auto found_after_s = [](double interval_s) {
     const auto front_end = create_front_end({.klt_levels = 3});
     for (int i = 0; i < 3; ++i) {
-      static_cast<void>(front_end->process(image_of(wide_texture(30 * i)), {i, 0.1 * i}));
+      matches_of(*front_end, image_of(wide_texture(30 * i)), {i, 0.1 * i});
     }
-    return front_end->process(image_of(wide_texture(180)), {3, 0.2 + interval_s});
+    return matches_of(*front_end, image_of(wide_texture(180)), {3, 0.2 + interval_s});
   };
   const Matches found = found_after_s(0.4);  // three frames were dropped
   EXPECT_GT(found.cur_uv.size(), 100U);
@@ -251,7 +257,7 @@ TEST(PatchFrontEnd, LooksWhereTheTurnLeadsUnlessItLeadsNowhere) {
         clue.turn = Eigen::Matrix3d::Identity();
         (*clue.turn)(0, 2) = -*turn_px;
       }
-      return front_end->process(image_of(wide_texture(shift_px)), clue);
+      return matches_of(*front_end, image_of(wide_texture(shift_px)), clue);
     };
     for (int i = 0; i < 3; ++i) {
       static_cast<void>(show(30 * i, 30.0));

@@ -18,19 +18,10 @@ Points random_points(SceneRandom& random, int n) {
   return points;
 }
 
-Points transform(const Similarity3& similarity, const Points& points) {
-  Points result;
-  for (const Eigen::Vector3d& point : points) {
-    result.push_back(similarity * point);
-  }
-  return result;
-}
-
 double squared_error(const Similarity3& similarity, const Points& source, const Points& target) {
-  const Points moved = transform(similarity, source);
   double sum = 0.0;
   for (std::size_t i = 0; i < source.size(); ++i) {
-    sum += (moved[i] - target[i]).squaredNorm();
+    sum += (similarity * source[i] - target[i]).squaredNorm();
   }
   return sum;
 }

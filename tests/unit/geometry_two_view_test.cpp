@@ -11,6 +11,8 @@ namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
+const Rigid3 kSideways(Eigen::Quaterniond::Identity(), {1.0, 0.0, 0.0});
+
 Eigen::Matrix3d shift(double x, double y) {
   Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
   h(0, 2) = x;
@@ -149,11 +151,9 @@ TEST(IsDecisive, EveryCriterionCounts) {
 }
 
 TEST(TestPoints, FarPointsCannotVoteOnTheSign) {
-  const Rigid3 motion(Eigen::Quaterniond::Identity(), {1.0, 0.0, 0.0});
   const Scene scene =
-      make_scene({.seed = 2, .min_depth = 1e3, .max_depth = 1e4, .cur_from_prev = motion});
-  const Rigid3 opposite(motion.rotation, -motion.translation);
-  for (const Rigid3& m : {motion, opposite}) {
+      make_scene({.seed = 2, .min_depth = 1e3, .max_depth = 1e4, .cur_from_prev = kSideways});
+  for (const Rigid3& m : {kSideways, kSideways.inverse()}) {
     const PointTest result = test_points(m, {scene.prev_uv, scene.cur_uv}, scene.camera);
     EXPECT_EQ(result.num_good, 200);
     EXPECT_LT(result.parallax_deg, 0.1);
@@ -162,22 +162,20 @@ TEST(TestPoints, FarPointsCannotVoteOnTheSign) {
 
 TEST(TestPoints, ReprojectionBoundIsTwoSigmaInEitherImage) {
   // Sideways motion: rows are epipolar lines; a row difference is shared by the two images.
-  const Rigid3 motion(Eigen::Quaterniond::Identity(), {1.0, 0.0, 0.0});
   const Points prev(4, Eigen::Vector2d(600.0, 180.0));
   const Points cur = {{650.0, 180.0}, {650.0, 183.9}, {650.0, 184.1}, {650.0, 192.1}};
-  EXPECT_THAT(test_points(motion, {prev, cur}, kitti_camera()).good_mask,
+  EXPECT_THAT(test_points(kSideways, {prev, cur}, kitti_camera()).good_mask,
               ::testing::ElementsAre(1, 1, 0, 0));
-  EXPECT_THAT(test_points(motion, {prev, cur}, kitti_camera(), {.sigma_px = 3.0}).good_mask,
+  EXPECT_THAT(test_points(kSideways, {prev, cur}, kitti_camera(), {.sigma_px = 3.0}).good_mask,
               ::testing::ElementsAre(1, 1, 1, 0));
 }
 
 TEST(TestPoints, BoundIsInPixelsOfEachAxisWhereFocalLengthsDiffer) {
   Camera camera = kitti_camera();
   camera.fy_px = 3.0 * camera.fx_px;
-  const Rigid3 sideways(Eigen::Quaterniond::Identity(), {1.0, 0.0, 0.0});
   const Points prev(2, Eigen::Vector2d(600.0, 180.0));
   const Points cur = {{650.0, 183.9}, {650.0, 184.1}};
-  EXPECT_THAT(test_points(sideways, {prev, cur}, camera).good_mask, ::testing::ElementsAre(1, 0));
+  EXPECT_THAT(test_points(kSideways, {prev, cur}, camera).good_mask, ::testing::ElementsAre(1, 0));
 }
 
 TEST(TestPoints, ParallaxIsThatOfTheFiftyFirstPoint) {
@@ -249,12 +247,11 @@ TEST(Triangulate, NoisyMatchesGiveTheLeastReprojectionError) {
 }
 
 TEST(Triangulate, WithoutMeetingRaysNothingIsFinite) {
-  const Rigid3 sideways(Eigen::Quaterniond::Identity(), {1.0, 0.0, 0.0});
   const Rigid3 forward(Eigen::Quaterniond::Identity(), {0.0, 0.0, -1.0});
   const Eigen::Vector2d center(0.0, 0.0);
   const Eigen::Vector2d side(0.3, 0.1);
   for (const TriangulatedPoint& point :
-       {triangulate(sideways, side, side), triangulate(Rigid3(), side, side),
+       {triangulate(kSideways, side, side), triangulate(Rigid3(), side, side),
         triangulate(Rigid3(), side, center), triangulate(forward, center, center)}) {
     EXPECT_FALSE(point.finite);
   }

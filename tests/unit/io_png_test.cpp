@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "io/image_file.hpp"
 #include "io/png.hpp"
 #include "support/test.hpp"
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "mapping/map_adjustment.hpp"
-#include "mapping/pose_graph.hpp"
 #include "support/synthetic_drive_tracks.hpp"
 #include "support/test.hpp"
 

@@ -73,14 +73,13 @@ TEST_F(MapFiles, SayWhatTheyAreInstead) {
 /// Each of the contents' bytes in turn claims a list as long as can be.
 TEST_F(MapFiles, TakeNoListsWordForItsLength) {
   const std::string contents = bytes_of(small_map()).substr(kHeaderBytes);
+  const auto claims_at = [&](std::size_t i) {
+    return sealed_map(std::string(contents).replace(i, 8, 8, '\x7f'));
+  };
   for (std::size_t i = 0; i + 8 <= contents.size(); i += 4) {
-    std::string claims = contents;
-    claims.replace(i, 8, 8, '\x7f');
-    (void)refusal(sealed_map(claims));  // no more memory than the file
+    (void)refusal(claims_at(i));  // no more memory than the file
   }
-  std::string claims = contents;
-  claims.replace(0, 8, 8, '\x7f');
-  EXPECT_THAT(refusal(sealed_map(claims)), HasSubstr("the map is damaged"));
+  EXPECT_THAT(refusal(claims_at(0)), HasSubstr("the map is damaged"));
   EXPECT_THAT(refusal(sealed_map(contents + "12")), HasSubstr("the map is damaged"));
 }
 

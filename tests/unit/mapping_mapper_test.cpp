@@ -67,11 +67,8 @@ struct Journey {
     return unit_m * (result(i).map_from_world * result(i).world_from_camera).translation;
   }
   [[nodiscard]] int num_recognized() const {
-    int number = 0;
-    for (const FrameResult& frame : run.results) {
-      number += frame.recognized_frame >= 0 ? 1 : 0;
-    }
-    return number;
+    return static_cast<int>(std::ranges::count_if(
+        run.results, [](const FrameResult& frame) { return frame.recognized_frame >= 0; }));
   }
 
   DriveTracks drive;

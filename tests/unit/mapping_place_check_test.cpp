@@ -19,6 +19,14 @@ DescribedPoints street(unsigned seed = 1) {
   return DescribedPoints(points_along(path, 1200, seed), seed);
 }
 
+/// The street, what was seen of it, and what is seen now.
+std::tuple<DescribedPoints, KeptKeyframe, KeptKeyframe> two_views() {
+  DescribedPoints points = street();
+  KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
+  KeptKeyframe recent = points.see(kNewPose, kNewUnits, 100000);
+  return {std::move(points), std::move(old), std::move(recent)};
+}
+
 PlaceView view_of(const KeptKeyframe& keyframe) {
   return {keyframe.camera, keyframe.corners, keyframe.descriptors};
 }
@@ -34,9 +42,7 @@ double turn_rad(const Similarity3& a, const Similarity3& b) {
 }
 
 TEST(PlaceCheck, FindsTheSimilarityOfTwoViews) {
-  DescribedPoints points = street();
-  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
-  KeptKeyframe recent = points.see(kNewPose, kNewUnits, 100000);
+  auto [points, old, recent] = two_views();
   for (std::size_t i = 0; i < recent.descriptors.size(); i += 3) {
     recent.descriptors[i] = points.draw();  // a corner that is new
   }
@@ -57,9 +63,7 @@ TEST(PlaceCheck, FindsTheSimilarityOfTwoViews) {
 }
 
 TEST(PlaceCheck, BothMustAgree) {
-  DescribedPoints points = street();
-  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
-  KeptKeyframe recent = points.see(kNewPose, kNewUnits, 100000);
+  auto [points, old, recent] = two_views();
   for (KeptCorner& corner : recent.corners) {
     corner.in_camera *= corner.track_id % 2 == 0 ? 1.0F : 2.0F;  // what it sees is another shape
   }
@@ -67,9 +71,7 @@ TEST(PlaceCheck, BothMustAgree) {
 }
 
 TEST(PlaceCheck, APartOfTheImageIsNotEnough) {
-  DescribedPoints points = street();
-  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
-  KeptKeyframe recent = points.see(kNewPose, kNewUnits, 100000);
+  auto [points, old, recent] = two_views();
   for (std::size_t i = 0; i < recent.corners.size(); ++i) {
     const Eigen::Vector2f uv = recent.corners[i].uv;
     if (uv.x() > 600.0F || uv.y() < 90.0F) {
@@ -80,9 +82,7 @@ TEST(PlaceCheck, APartOfTheImageIsNotEnough) {
 }
 
 TEST(PlaceCheck, LandmarksThatAreNewHaveWrongDepths) {
-  DescribedPoints points = street();
-  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
-  KeptKeyframe recent = points.see(kNewPose, kNewUnits, 100000);
+  auto [points, old, recent] = two_views();
   std::mt19937 random(1);
   std::normal_distribution<float> error(1.0F, 0.08F);
   for (KeptCorner& corner : recent.corners) {
@@ -133,9 +133,7 @@ TEST(PlaceCheck, ThoseAroundAPlaceTellTogetherWhereTheCameraIs) {
 
 /// A third of the image, and few of its corners, but where they were expected.
 TEST(PlaceCheck, WhatIsExpectedNeedsFewerCorners) {
-  DescribedPoints points = street();
-  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
-  KeptKeyframe recent = points.see(kNewPose, kNewUnits, 100000);
+  auto [points, old, recent] = two_views();
   int num_left = 0;
   for (std::size_t i = 0; i < recent.corners.size(); ++i) {
     const bool stays = recent.corners[i].uv.x() < 500.0F && num_left < 26;

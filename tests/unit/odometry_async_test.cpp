@@ -63,6 +63,11 @@ class Async : public ::testing::Test {
   static Status push(AsyncOdometry& odometry, std::size_t i) {
     return odometry.push(frames().images[i], frames().order, time_s(i));
   }
+  static void push_all(AsyncOdometry& odometry) {
+    for (std::size_t i = 0; i < frames().images.size(); ++i) {
+      ASSERT_TRUE(push(odometry, i));
+    }
+  }
 
   static inline std::vector<Left> plain_;  ///< by Odometry
 };
@@ -101,9 +106,7 @@ TEST_F(Async, NextGivesTheSameResultsToAnotherThread) {
       }
       EXPECT_GT(num_points, 0U);
     });
-    for (std::size_t i = 0; i < frames().images.size(); ++i) {
-      ASSERT_TRUE(push(odometry, i));
-    }
+    push_all(odometry);
     EXPECT_TRUE(odometry.finish());
     taker.join();
     ASSERT_EQ(poses.size(), plain_.size());
@@ -116,9 +119,7 @@ TEST_F(Async, NextGivesTheSameResultsToAnotherThread) {
 /// Whoever pushes all before he takes any is not left waiting.
 TEST_F(Async, ResultsWaitUntilTheyAreTaken) {
   AsyncOdometry odometry = create(2);
-  for (std::size_t i = 0; i < frames().images.size(); ++i) {
-    ASSERT_TRUE(push(odometry, i));
-  }
+  push_all(odometry);
   EXPECT_EQ((*odometry.next())->state, FrameState::kFirst);
   EXPECT_TRUE(odometry.finish());
   std::size_t num_taken = 1;
@@ -213,9 +214,7 @@ TEST_F(Async, AfterAResetTheWorldIsNew) {
     }
     ASSERT_EQ(found.size(), 9U) << "frames before it are done";
     found.clear();
-    for (std::size_t i = 0; i < frames().images.size(); ++i) {
-      ASSERT_TRUE(push(*odometry, i));
-    }
+    push_all(*odometry);
     EXPECT_TRUE(odometry->finish());
     expect_same(found, plain_);
     EXPECT_THAT(message_of(odometry->reset()), HasSubstr("after finish()"));

@@ -145,17 +145,16 @@ TEST(MotionCovariance, GrowsFromFrameToFrameWhileNothingIsSeenAndOnceMoreAfterwa
 
 /// A tracked frame's motion that is known but for the term in question.
 MotionCovariance::Motion known_motion() {
-  MotionCovariance::Motion motion{.state = FrameState::kTracking,
-                                  .is_localized = true,
-                                  .prev_from_cur = {so3_exp({0.0, 0.1, 0.0}), {0.0, 0.0, 2.0}},
-                                  .dt_s = 0.1,
-                                  .usual_step = 2.0,
-                                  .hidden_px = 0.15,
-                                  .two_view = Matrix6d::Zero(),
-                                  .camera = kitti_camera(),
-                                  .camera_sigma = std::nullopt,
-                                  .scale_sigma = std::nullopt};
-  return motion;
+  return {.state = FrameState::kTracking,
+          .is_localized = true,
+          .prev_from_cur = {so3_exp({0.0, 0.1, 0.0}), {0.0, 0.0, 2.0}},
+          .dt_s = 0.1,
+          .usual_step = 2.0,
+          .hidden_px = 0.15,
+          .two_view = Matrix6d::Zero(),
+          .camera = kitti_camera(),
+          .camera_sigma = std::nullopt,
+          .scale_sigma = std::nullopt};
 }
 
 TEST(MotionCovariance, KeepsToTheUnitOfTheMap) {

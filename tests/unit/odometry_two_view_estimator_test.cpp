@@ -13,14 +13,13 @@ Scene drive_scene(const Rigid3& prev_from_cur,
                   double noise_px,
                   double outliers,
                   std::uint64_t seed) {
-  SceneOptions options{.num_points = 600,
-                       .noise_px = noise_px,
-                       .outlier_ratio = outliers,
-                       .seed = seed,
-                       .min_depth = 5.0,
-                       .max_depth = 40.0,
-                       .cur_from_prev = prev_from_cur.inverse()};
-  return make_scene(options);
+  return make_scene({.num_points = 600,
+                     .noise_px = noise_px,
+                     .outlier_ratio = outliers,
+                     .seed = seed,
+                     .min_depth = 5.0,
+                     .max_depth = 40.0,
+                     .cur_from_prev = prev_from_cur.inverse()});
 }
 
 MeasuredMotion measure(const Scene& scene, bool is_initializing = false) {

@@ -147,13 +147,9 @@ TEST(Check, ABaselineBoundsItsErrorsByTheTolerance) {
 }
 
 TEST(Check, ABaselineOfAnotherRecordingOtherFramesOrAnotherAlignmentIsAProblem) {
-  EXPECT_THAT(problem_of(compare(R"({"frames": 399, "alignment": "none", "t_rel_percent": 0.1,
-      "ate_rmse_m": {"sim3": 1}, "tracked_fraction": 1, "map": {"t_rel_percent": 0}})",
-                                 kBaseline)),
+  EXPECT_THAT(problem_of(compare(replace_first(kBaseline, "400", "399"), kBaseline)),
               HasSubstr("baseline.json: frames: expected 399 as in the run, found 400"));
-  EXPECT_THAT(problem_of(compare(R"({"frames": 400, "alignment": "sim3", "t_rel_percent": 0.1,
-      "ate_rmse_m": {"sim3": 1}, "tracked_fraction": 1, "map": {"t_rel_percent": 0}})",
-                                 kBaseline)),
+  EXPECT_THAT(problem_of(compare(replace_first(kBaseline, "none", "sim3"), kBaseline)),
               HasSubstr(R"(expected "sim3" as in the run, found "none")"));
   EXPECT_THAT(problem_of(compare(R"({"sequence": "00", "t_rel_percent": 0.1})",
                                  R"({"sequence": "03", "t_rel_percent": 0.1})")),

@@ -2,6 +2,7 @@
 #include <clocale>
 #include <locale>
 
+#include "evaluation/trajectory.hpp"
 #include "report/data_files.hpp"
 #include "support/ply_reader.hpp"
 #include "support/run_program.hpp"
@@ -57,8 +58,7 @@ TEST(FramesCsv, HoldsOneRowPerFrame) {
 TEST(FramesCsv, ErrorsStandInTheRowsThatHaveATruth) {
   const std::string row = frames_csv_row(7, 0.5, tracked(), kPose);
   const FrameError errors[] = {{1, 0.25, 1.0 / 3.0}};
-  std::string filled = row;
-  filled.replace(filled.size() - 3, 3, ",0.2500,0.3333\n");
+  const std::string filled = row.substr(0, row.size() - 3) + ",0.2500,0.3333\n";
   EXPECT_EQ(frames_csv_with_errors(kHeader + row + row + row, errors),
             kHeader + row + filled + row);
 }

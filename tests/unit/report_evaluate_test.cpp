@@ -21,10 +21,10 @@ struct Files {
   std::filesystem::path truth = folder / "truth.txt";
   std::filesystem::path kitti = folder / "estimate.txt";
   std::filesystem::path tum = folder / "estimate_tum.txt";
+  std::vector<double> times_s = std::vector<double>(300);
 
   Files() {
     const Trajectory estimate = circle(300, 1.02);
-    std::vector<double> times_s(300);
     for (std::size_t i = 0; i < 300; ++i) {
       times_s[i] = 0.1 * static_cast<double>(i);
     }
@@ -67,15 +67,14 @@ TEST(EvaluateFiles, AppliesTheAlignment) {
 
 TEST(EvaluateFiles, NamesTheFileThatDoesNotFit) {
   const Files files;
-  const auto message = [&](const std::filesystem::path& truth,
-                           const std::filesystem::path& estimate) {
-    return message_of(evaluate_files({truth, {files.kitti, estimate}, Alignment::kNone}));
+  const auto message = [&](const std::filesystem::path& estimate) {
+    return message_of(evaluate_files({files.truth, {files.kitti, estimate}, Alignment::kNone}));
   };
   const auto one = files.folder.file("one.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
-  EXPECT_THAT(message(files.truth, one), HasSubstr("one.txt: expected 300 poses as in "));
-  EXPECT_THAT(message(files.truth, one), HasSubstr("found 1 (poses are compared line by line"));
+  EXPECT_THAT(message(one), HasSubstr("one.txt: expected 300 poses as in "));
+  EXPECT_THAT(message(one), HasSubstr("found 1 (poses are compared line by line"));
   const auto tum = files.folder.file("tum.txt", "# TUM\n0.5 0 0 0 0 0 0 1\n");
-  EXPECT_THAT(message(files.truth, tum), HasSubstr("unless both files have times"));
+  EXPECT_THAT(message(tum), HasSubstr("unless both files have times"));
 }
 
 TEST(EvaluateFiles, FramesTakePartOfTheGroundTruth) {
@@ -102,19 +101,15 @@ TEST(EvaluateFiles, FilesWithTimesAreMatchedByTime) {
   const Files files;
   const Trajectory truth = circle(300, 1.0);
   // Every second pose of the estimate, 4 ms late; the last one far behind the ground truth.
-  std::vector<double> truth_s(300);
   std::vector<double> times_s;
   Trajectory estimate;
-  for (std::size_t i = 0; i < 300; ++i) {
-    truth_s[i] = 0.1 * static_cast<double>(i);
-    if (i % 2 == 1) {
-      times_s.push_back(truth_s[i] + 0.004);
-      estimate.push_back(truth[i]);
-    }
+  for (std::size_t i = 1; i < 300; i += 2) {
+    times_s.push_back(files.times_s[i] + 0.004);
+    estimate.push_back(truth[i]);
   }
   times_s.push_back(99.0);
   estimate.emplace_back();
-  ASSERT_TRUE(write_tum_trajectory(files.folder / "truth_tum.txt", truth_s, truth));
+  ASSERT_TRUE(write_tum_trajectory(files.folder / "truth_tum.txt", files.times_s, truth));
   ASSERT_TRUE(write_tum_trajectory(files.tum, times_s, estimate));
   EvaluationRequest request{files.folder / "truth_tum.txt", {files.tum}};
   const auto report = evaluate_files(request);

@@ -6,7 +6,6 @@
 #include "report/run_page.hpp"
 #include "support/report_content.hpp"
 #include "support/test.hpp"
-#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
@@ -36,7 +35,7 @@ class RunPageTest : public ::testing::Test {
     EXPECT_TRUE(write_run_page(
         folder_ / "report.html",
         {plot, report_, csv, map_, truth_, {}, small_frames_, "key: value", "stemvo run"}));
-    return report_content(read_text_file(folder_ / "report.html").value_or(""));
+    return report_content(read_all(folder_ / "report.html"));
   }
 
   TempFolder folder_;
@@ -101,7 +100,7 @@ class HtmlPage : public ::testing::Test {
  protected:
   std::string written(const nlohmann::ordered_json& content) {
     EXPECT_TRUE(html::write_page(folder_ / "page.html", content));
-    return read_text_file(folder_ / "page.html").value_or("");
+    return read_all(folder_ / "page.html");
   }
 
   TempFolder folder_;

@@ -83,9 +83,7 @@ TEST(Stem, SameBytesForAnyNumberOfThreadsAndAnyHistory) {
     cv::setNumThreads(threads);
     ASSERT_TRUE(stem.apply(other));  // another size in between
     const auto channel = stem.apply(frame).value();
-    if (first.empty()) {
-      first = channel.values;
-    }
+    first = first.empty() ? channel.values : first;
     ASSERT_EQ(channel.values.size(), first.size());
     EXPECT_EQ(std::memcmp(channel.values.data, first.data, first.total() * sizeof(float)), 0);
   }

@@ -16,16 +16,10 @@ class SyntheticDriveTest : public ::testing::Test {
   static SyntheticDriveOptions small(int num_frames) {
     return {.num_frames = num_frames, .width_px = 160, .height_px = 48};
   }
-  fs::path write_poses(const Trajectory& poses) const {
-    const fs::path file = root_ / "given.txt";
-    EXPECT_TRUE(write_kitti_trajectory(file, poses));
-    return file;
-  }
   std::string all_bytes(const std::string& name, int num_frames) const {
     std::string bytes = read_all(root_ / name / "poses" / "00.txt");
     for (int i = 0; i < num_frames; ++i) {
-      bytes +=
-          read_all(root_ / name / "sequences" / "00" / "image_2" / fmt::format("{:06}.png", i));
+      bytes += read_all(root_ / name / fmt::format("sequences/00/image_2/{:06}.png", i));
     }
     return bytes;
   }
@@ -112,7 +106,8 @@ TEST_F(SyntheticDriveTest, RendersAnyGivenPoses) {
   }
   SyntheticDriveOptions options = small(1000);
   options.write_depth = true;
-  options.trajectory = write_poses(poses);
+  options.trajectory = root_ / "given.txt";
+  ASSERT_TRUE(write_kitti_trajectory(*options.trajectory, poses));
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
   const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
   ASSERT_EQ(sequence->size(), poses.size());
@@ -120,8 +115,7 @@ TEST_F(SyntheticDriveTest, RendersAnyGivenPoses) {
     const Rigid3 error = sequence->ground_truth->poses.at(i).inverse() * poses[i];
     EXPECT_LT(error.translation.norm() + error.angle_rad(), 1e-8);
     // The last numbers of the file: the road before the car, which nothing may stand on.
-    const std::string depth =
-        read_all(root_ / "out" / "sequences" / "00" / "depth" / fmt::format("{:06}.npy", i));
+    const std::string depth = read_all(root_ / fmt::format("out/sequences/00/depth/{:06}.npy", i));
     ASSERT_EQ(depth.size(), 128U + 4U * 160U * 48U);
     float z = 0.0F;
     std::memcpy(&z, depth.data() + depth.size() - 4U * 80U, sizeof(z));

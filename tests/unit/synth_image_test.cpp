@@ -5,7 +5,6 @@
 #include "support/rendered_frames.hpp"
 #include "support/test.hpp"
 #include "synth/basics.hpp"
-#include "synth/materials.hpp"
 #include "synth/renderer.hpp"
 
 namespace stemvo::synth {

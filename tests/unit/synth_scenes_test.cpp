@@ -4,7 +4,6 @@
 #include "support/test.hpp"
 #include "synth/drive.hpp"
 #include "synth/renderer.hpp"
-#include "synth/traffic.hpp"
 
 namespace stemvo::synth {
 namespace {

@@ -26,7 +26,6 @@ TEST(SmallChip, NoiseIsThatOfPhotonsAndReading) {
   for (const float exposure : {0.5F, 1.0F, 2.0F}) {
     for (const float level : {0.05F, 0.2F, 0.4F}) {
       const cv::Mat light(60, 80, CV_32FC3, cv::Scalar::all(level));
-      const cv::Mat rgb = expose_chip(light, exposure, 7);
       const cv::Rect middle(35, 25, 10, 10);  // no vignette there
       std::vector<double> electrons;
       for (int seed = 0; seed < 30; ++seed) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <ctime>
 
-#include "report/metrics_json.hpp"
 #include "support/test.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -9,7 +8,6 @@ namespace stemvo {
 namespace {
 
 using namespace std::chrono_literals;
-using ::testing::ContainsRegex;
 
 /// Uses the processor until this thread has had it for so long.
 void work_for(std::chrono::milliseconds time) {
