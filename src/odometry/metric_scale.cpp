@@ -121,8 +121,8 @@ double MetricScale::measure(const RoadImage* road,
     filter_.predict(interval_s);
     road_filter_.predict(interval_s);
   }
-  const bool is_measured = road_.has_value() && road != nullptr &&
-                           measure_road(*road, cur_from_prev, landmarks);
+  const bool is_measured =
+      road_.has_value() && road != nullptr && measure_road(*road, cur_from_prev, landmarks);
   const bool is_way_measured = ways_.measure(filter_);
   is_way_measured_ = is_way_measured_ || is_way_measured;
   state_ = is_measured || is_way_measured          ? ScaleState::kMeasured
@@ -130,8 +130,8 @@ double MetricScale::measure(const RoadImage* road,
                                                    : ScaleState::kNone;
   ++num_frames_;
   const bool is_proven = is_scale_proven_ || is_road_believed_ || is_way_measured_;
-  is_scale_new_ = is_proven && num_frames_ > kMaxGuessed &&
-                  std::abs(filter_.log_scale()) > kNewLogScale;
+  is_scale_new_ =
+      is_proven && num_frames_ > kMaxGuessed && std::abs(filter_.log_scale()) > kNewLogScale;
   is_scale_proven_ = is_proven;
   if (!filter_.is_initialized() || (!is_proven && num_frames_ > kMaxGuessed)) {
     return 1.0;

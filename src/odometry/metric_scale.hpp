@@ -111,7 +111,7 @@ class MetricScale {
   ScaleFilter road_filter_;
   std::optional<RoadScale> road_;
   WayScale ways_;
-  double apart_ = 0.0;  ///< contradiction() when the road was measured last
+  double apart_ = 0.0;        ///< contradiction() when the road was measured last
   double last_time_s_ = 0.0;  ///< of the frame before
   bool has_ways_ = false;
   bool is_road_believed_ = false;

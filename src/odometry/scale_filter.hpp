@@ -50,9 +50,7 @@ class ScaleFilter {
   [[nodiscard]] double log_scale() const { return log_scale_; }
   [[nodiscard]] double sigma() const { return sigma_; }
   /// Between ways a map may drift by more than it mostly does: so many times `sigma` is the error.
-  [[nodiscard]] double way_sigma_factor() const {
-    return std::sqrt(std::max(1.0, way_distance2_));
-  }
+  [[nodiscard]] double way_sigma_factor() const { return std::sqrt(std::max(1.0, way_distance2_)); }
 
  private:
   struct Record {

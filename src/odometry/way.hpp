@@ -94,7 +94,9 @@ class WayScale {
     }
   }
   /// Since the last way that was measured: its middle, its end.
-  [[nodiscard]] double age_s(double now_s) const { return now_s - 0.5 * (last_from_s_ + last_to_s_); }
+  [[nodiscard]] double age_s(double now_s) const {
+    return now_s - 0.5 * (last_from_s_ + last_to_s_);
+  }
   [[nodiscard]] double silent_s(double now_s) const { return now_s - last_to_s_; }
   /// Gives the filter what the ways that have ended tell. Returns whether one of them was believed.
   bool measure(ScaleFilter& filter);

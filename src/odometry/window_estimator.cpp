@@ -107,8 +107,8 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   }
   const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
   // What passes hides the landmarks; more of the rest stands than agrees with another pose.
-  if (!still_px && num_standing(frame, now) >
-                       std::max(found ? found->num_inliers : 0, options_.min_inliers)) {
+  if (!still_px &&
+      num_standing(frame, now) > std::max(found ? found->num_inliers : 0, options_.min_inliers)) {
     return FrameState::kStationary;
   }
   if (found.has_value()) {
@@ -284,8 +284,8 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
     position = guess.translation;
   } else if (!window_.keyframes.empty() && !is_still) {
     position = predict().translation;
-    moving_s *= std::min(1.0, (position - world_from_camera_.translation).norm() /
-                                  (speed_ * interval_s_));
+    moving_s *=
+        std::min(1.0, (position - world_from_camera_.translation).norm() / (speed_ * interval_s_));
   }
   still_s_ += interval_s_ - moving_s;
   world_from_camera_ = Rigid3(guess.rotation, position);

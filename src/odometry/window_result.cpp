@@ -102,9 +102,9 @@ void WindowEstimator::describe(const Frame& frame, FrameResult& result) {
   result.world_from_camera = world_from_camera_;
   result.is_scale_new = is_localized(frame) && result.state == FrameState::kInitializing;
   scale_.report(result);
-  const bool is_guessed =
-      result.state == FrameState::kInitializing || result.state == FrameState::kLowParallax ||
-      (result.state == FrameState::kRotating && !window_.keyframes.empty());
+  const bool is_guessed = result.state == FrameState::kInitializing ||
+                          result.state == FrameState::kLowParallax ||
+                          (result.state == FrameState::kRotating && !window_.keyframes.empty());
   result.is_measured = is_measured(result.state) && !(is_initializing_ && is_guessed);
   result.map_id = map_ids_.now();
   result.map_from_world = mapper_.map_from_world();
@@ -202,8 +202,7 @@ void WindowEstimator::remember(const Frame& frame, FrameState state) {
     }
     const double speed = motion_.speed();
     speed_ = speed > 0.0 && state == FrameState::kTracking ? speed : speed_;
-  } else if (!has_pose && state != FrameState::kStationary &&
-             state != FrameState::kInitializing) {
+  } else if (!has_pose && state != FrameState::kStationary && state != FrameState::kInitializing) {
     motion_.lost(interval_s_);
   }
   if (frame.has_image()) {

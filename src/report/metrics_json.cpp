@@ -17,8 +17,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kFewBelieved = 0.5;  ///< a smaller share is warned of
 constexpr double kFewContradicted = 0.05;
-constexpr double kFewTracked = 0.5;   ///< a smaller share of frames that were measured is, too
-constexpr double kInPlace = 0.95;     ///< a larger share of frames in place is told
+constexpr double kFewTracked = 0.5;  ///< a smaller share of frames that were measured is, too
+constexpr double kInPlace = 0.95;    ///< a larger share of frames in place is told
 
 std::string scale_explained(const MetricsReport& report) {
   const std::string& source = report.scale_source;

@@ -21,7 +21,7 @@ struct PlantedDrive {
   double path_m = 0.0;   ///< true, from the first frame on that the scale was measured
   double found_m = 0.0;  ///< the same, as the scale has it
   double largest_step_error = 0.0;
-  int num_far_off = 0;  ///< frames whose scale is wrong by over 3 sigma
+  int num_far_off = 0;       ///< frames whose scale is wrong by over 3 sigma
   double units_per_m = 0.3;  ///< at first a guess
   FrameResult result;
 
@@ -221,7 +221,8 @@ TEST(WayInput, RefusesWhatIsNoMeasurementAndSaysWhy) {
     return message_of(ways.add_distance(from_s, to_s, metres, sigma));
   };
   EXPECT_THAT(distance(2.0, 1.0, 1.0, 0.1), HasSubstr("its beginning, 2 s, found 1 s"));
-  EXPECT_THAT(distance(1.0, 2.0, -1.0, 0.1), HasSubstr("expected 0 m to 1000 m a second, found -1 m in 1 s"));
+  EXPECT_THAT(distance(1.0, 2.0, -1.0, 0.1),
+              HasSubstr("expected 0 m to 1000 m a second, found -1 m in 1 s"));
   EXPECT_THAT(distance(1.0, 2.0, 1.0, -0.1), HasSubstr("expected a sigma above 0, found -0.1"));
   EXPECT_EQ(distance(1.0, 2.0, 1.0, 0.1), "no error");
   EXPECT_THAT(distance(0.0, 2.0, 1.0, 0.1), HasSubstr("after the last distance's, 2 s, found 2 s"));

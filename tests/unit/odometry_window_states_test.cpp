@@ -65,8 +65,7 @@ TEST(WindowEstimator, MovingOffKeepsTheUnitWithFewOldLandmarks) {
 /// does not move, says that the camera still stands.
 TEST(WindowEstimator, WhoStandsBehindALorryStays) {
   const Rigid3 step(so3_exp({0.0, 0.003, 0.0}), {0.0, 0.0, 0.8});
-  const std::vector<Rigid3> path =
-      DriveTracks::go_on(DriveTracks::repeat(step, 20), Rigid3(), 40);
+  const std::vector<Rigid3> path = DriveTracks::go_on(DriveTracks::repeat(step, 20), Rigid3(), 40);
   DriveTracks drive(path, points_along(path, 2000, 4), 0.04, 4);
   for (int i = 0; i < 8; ++i) {
     drive.renew_tracks(22 + i, i, 8);
@@ -75,7 +74,8 @@ TEST(WindowEstimator, WhoStandsBehindALorryStays) {
     auto& seen = drive.observations[static_cast<std::size_t>(i)];
     std::erase_if(seen, [&](const auto& one) { return one.second.x() > 250.0; });
     for (int k = 0; k < 300; ++k) {
-      const Eigen::Vector2d place(250.0 + 40.0 * (k % 30) + 12.0 * (i - 30), 30.0 + 30.0 * (k / 30));
+      const Eigen::Vector2d place(250.0 + 40.0 * (k % 30) + 12.0 * (i - 30),
+                                  30.0 + 30.0 * (k / 30));
       if (place.x() < drive.camera.width_px) {
         seen.emplace(100000 + k, place);
       }

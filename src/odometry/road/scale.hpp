@@ -21,8 +21,8 @@ namespace stemvo {
 
 /// The road's part in the scale after a frame; nothing of it looks ahead.
 struct RoadScaleEstimate {
-  bool is_believed = false;      ///< it is the road; else the scale is a guess
-  bool is_measured = false;      ///< this frame's road was measured and believed
+  bool is_believed = false;  ///< it is the road; else the scale is a guess
+  bool is_measured = false;  ///< this frame's road was measured and believed
   /// What this frame's road says, log(metres per unit) and its sigma; nullopt: nothing.
   std::optional<std::pair<double, double>> log_scale;
   std::string_view reason = "";  ///< where is_measured is false
