@@ -104,7 +104,7 @@ class PythonStem {
   Stem stem_;
 };
 
-/// The odometry behind the stem; a study calls it from one thread.
+/// The odometry behind the stem; threads wait for each other.
 class PythonChannelOdometry {
  public:
   PythonChannelOdometry(const nb::object& camera, const nb::object& options) {
@@ -121,11 +121,6 @@ class PythonChannelOdometry {
   FrameResult process(const Channel* channel,
                       const std::optional<GivenArray>& image,
                       double timestamp) {
-    if (!(timestamp > last_time_s_)) {
-      throw nb::value_error(
-          fmt::format("timestamp: expected more than {}, found {}", last_time_s_, timestamp)
-              .c_str());
-    }
     const cv::Mat pixels = image ? value_or_raise(view_of(*image, "image")).pixels : cv::Mat();
     if (image && pixels.size() != size_) {
       throw nb::value_error(fmt::format("image: expected {}x{} pixels, found {}x{}", size_.width,
@@ -134,6 +129,10 @@ class PythonChannelOdometry {
     }
     const nb::gil_scoped_release release;
     const std::lock_guard lock(turn_);
+    if (!(timestamp > last_time_s_)) {
+      throw std::invalid_argument(
+          fmt::format("timestamp: expected more than {}, found {}", last_time_s_, timestamp));
+    }
     last_time_s_ = timestamp;
     Frame frame;
     frame.time_s = timestamp;
@@ -143,7 +142,10 @@ class PythonChannelOdometry {
     }
     return odometry_->process(std::move(frame));
   }
-  [[nodiscard]] DoubleArray trajectory() const {
+  [[nodiscard]] DoubleArray trajectory() {
+    const nb::gil_scoped_release release;
+    const std::lock_guard lock(turn_);
+    const nb::gil_scoped_acquire acquire;
     return array_of(std::span<const Rigid3>(odometry_->estimator().trajectory()));
   }
 

@@ -93,7 +93,7 @@ struct FrameResult {
   /// k1, k2 of a distortion that frames had nevertheless: pixels are freed of it.
   Eigen::Vector2d radial = Eigen::Vector2d::Zero();
   std::optional<CameraSigma> camera_sigma;  ///< nullopt: it is not refined
-  std::optional<double> scale_sigma;  ///< of log(metres per unit); nullopt: the road is not asked
+  std::optional<double> scale_sigma;        ///< of log(metres per unit); nullopt: nobody measures
   StageTimes times;
   std::string problem;  ///< why the stem gave no channel (the frame counts as no_image), else empty
 };

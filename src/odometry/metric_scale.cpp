@@ -19,11 +19,13 @@ constexpr double kTrack_px = 0.7;     ///< error of a track over the window
 /// Road and ways that differ by more, and by so many sigmas, are not both right.
 constexpr double kContradiction = 0.04;
 constexpr double kContradictionSigmas = 3.0;
-/// Ways that have ended so long ago leave the scale to a road that is believed.
-constexpr double kSilent_s = 2.0;
+/// What a road said that is no longer believed is forgotten by 1 / e.
+constexpr double kForgotten_s = 5.0;
 /// The map does not drift as fast for longer; and a road sees most of it.
 constexpr double kMaxAge_s = 10.0;
 constexpr double kMaxAgeBesideRoad_s = 0.8;
+/// Ways are compared with the road by the mean of so few: 1 / this.
+constexpr double kFewCompared = 0.1;
 /// Where a way says what the road's scale is, the road is searched for as far around it.
 constexpr double kSearchSigma = 0.3;
 
@@ -54,6 +56,7 @@ void MetricScale::restart(const RoadImage* road, double time_s, bool has_scale) 
   is_road_believed_ = false;
   is_way_measured_ = false;
   apart_ = 0.0;
+  num_compared_ = 0;
   state_ = ScaleState::kNone;
   if (road_.has_value()) {
     road_->restart();
@@ -62,15 +65,17 @@ void MetricScale::restart(const RoadImage* road, double time_s, bool has_scale) 
 }
 
 double MetricScale::contradiction() const {
-  const double apart = std::abs(filter_.log_scale() - road_filter_.log_scale());
-  const double sigma = std::hypot(filter_.sigma(), road_->sigma(road_filter_));
+  const double apart = std::abs(way_from_road_);
+  const double drift = kMapDrift * std::min(ways_.age_s(last_time_s_), kMaxAge_s);
+  const double sigma = std::hypot(filter_.sigma(), road_->sigma(road_filter_), drift);
   return apart > std::max(kContradiction, kContradictionSigmas * sigma) ? apart : 0.0;
 }
 
 double MetricScale::way_sigma() const {
   const double longest_s = is_road_believed_ && apart_ == 0.0 ? kMaxAgeBesideRoad_s : kMaxAge_s;
   const double drift = kMapDrift * std::min(ways_.age_s(last_time_s_), longest_s);
-  return std::hypot(filter_.way_sigma_factor() * filter_.sigma(), drift, apart_);
+  return std::min(std::hypot(filter_.way_sigma_factor() * filter_.sigma(), drift, apart_),
+                  ScaleFilter::kUnknownSigma);
 }
 
 bool MetricScale::measure_road(const RoadImage& road,
@@ -84,21 +89,24 @@ bool MetricScale::measure_road(const RoadImage& road,
   });
   is_road_believed_ = estimate.is_believed;
   reason_ = estimate.reason;
-  if (is_way_measured_ && estimate.is_believed && ways_.silent_s(last_time_s_) > kSilent_s) {
-    is_way_measured_ = false;
-    apart_ = 0.0;
-    filter_ = road_filter_;
-  }
   if (!has_ways_) {
     filter_ = road_filter_;
     return estimate.is_measured;
   }
   if (is_way_measured_ && estimate.is_measured) {
-    apart_ = contradiction();
-  }
-  if (apart_ > 0.0) {
-    reason_ = kRoadContradicted;
-    return false;
+    if (ways_.have_ended(last_time_s_)) {
+      is_way_measured_ = false;
+      is_unit_new_ = true;
+      apart_ = 0.0;
+      num_compared_ = 0;
+      filter_ = road_filter_;
+    } else {
+      apart_ = contradiction();
+    }
+    if (apart_ > 0.0) {
+      reason_ = kRoadContradicted;
+      return false;
+    }
   }
   // A road that is not proven does not bend what ways have measured.
   if (estimate.log_scale && (estimate.is_believed || !is_way_measured_)) {
@@ -123,7 +131,15 @@ double MetricScale::measure(const RoadImage* road,
   }
   const bool is_measured =
       road_.has_value() && road != nullptr && measure_road(*road, cur_from_prev, landmarks);
+  if (!is_road_believed_) {  // what it said is forgotten: it may have been none
+    apart_ *= std::exp(-interval_s / kForgotten_s);
+  }
   const bool is_way_measured = ways_.measure(filter_);
+  if (ways_.told() && is_road_believed_) {
+    const double gain = std::max(kFewCompared, 1.0 / ++num_compared_);
+    way_from_road_ += gain * (*ways_.told() - road_filter_.log_scale() - way_from_road_);
+  }
+  is_unit_new_ = is_unit_new_ || (is_way_measured && !is_way_measured_);
   is_way_measured_ = is_way_measured_ || is_way_measured;
   state_ = is_measured || is_way_measured          ? ScaleState::kMeasured
            : is_road_believed_ || is_way_measured_ ? ScaleState::kHeld
@@ -138,6 +154,7 @@ double MetricScale::measure(const RoadImage* road,
   }
   const double metres_per_unit = std::exp(filter_.log_scale());
   rescale(metres_per_unit);
+  is_unit_new_ = false;
   return metres_per_unit;
 }
 

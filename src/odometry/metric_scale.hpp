@@ -18,7 +18,7 @@
 
 namespace stemvo {
 
-/// FrameResult::road_reason of a road that is believed, but not what ways say.
+/// FrameResult::road_reason where road and ways, both believed, contradict each other.
 inline constexpr std::string_view kRoadContradicted = "it contradicts the speed";
 
 /// Metres per unit of an estimator, from the road (`scale.source: camera_height`), from ways that
@@ -55,6 +55,7 @@ class MetricScale {
                                const std::vector<RoadLandmark>& landmarks = {});
   /// The map was multiplied by `factor` (new units = factor * old units).
   void rescale(double factor) {
+    is_unit_new_ = true;
     filter_.shift(-std::log(factor));
     road_filter_.shift(-std::log(factor));
     ways_.rescale(factor);
@@ -80,6 +81,7 @@ class MetricScale {
       state_ = ScaleState::kNone;
       is_road_believed_ = false;
       is_way_measured_ = false;
+      apart_ = 0.0;
       reason_ = road_.has_value() ? reason : "";
     }
   }
@@ -107,16 +109,19 @@ class MetricScale {
   [[nodiscard]] double way_sigma() const;
 
   ScaleFilter filter_;
-  /// What the road says by itself: where a way said what to look for, it would be found.
+  /// What the road says by itself: told where to look by ways, it would find what they say.
   ScaleFilter road_filter_;
   std::optional<RoadScale> road_;
   WayScale ways_;
+  double way_from_road_ = 0.0;  ///< difference of what they say, mean of the last ways
+  int num_compared_ = 0;
   double apart_ = 0.0;        ///< contradiction() when the road was measured last
   double last_time_s_ = 0.0;  ///< of the frame before
   bool has_ways_ = false;
   bool is_road_believed_ = false;
   bool is_way_measured_ = false;  ///< since the last restart
   bool is_scale_proven_ = false;  ///< the road was believed, or a way measured, since then
+  bool is_unit_new_ = false;      ///< for another reason than that the scale was proven
   bool is_scale_new_ = false;     ///< with this frame, in the middle of a map
   int num_frames_ = 0;            ///< measured on since then
   ScaleState state_ = ScaleState::kDisabled;

@@ -169,7 +169,7 @@ struct OdometryHandle::Impl {
   [[nodiscard]] Status reset() {
     const std::lock_guard lock(turn);
     if (!loops.reset()) {
-      return fail("reset: expected none after finish(), found one");
+      return loops.has_thrown() ? ended() : fail("reset: expected none after finish(), found one");
     }
     check.restart();
     log.restart();

@@ -56,7 +56,7 @@ Status WayInput::add_speed(double time_s, double metres_per_s, std::optional<dou
   const auto last_s = last_speed_ ? std::optional(last_speed_->time_s) : std::nullopt;
   STEMVO_TRY(check_time("speed", time_s, last_s, "speed"));
   if (!(std::abs(metres_per_s) <= kMaxSpeed)) {
-    return fail(fmt::format("speed: expected at most {} m/s, found {}", kMaxSpeed, metres_per_s));
+    return fail(fmt::format("speed: expected -{0} to {0} m/s, found {1}", kMaxSpeed, metres_per_s));
   }
   const double sigma = given_sigma.value_or(usual_speed_sigma(metres_per_s));
   STEMVO_TRY(check_sigma("speed", sigma));
@@ -107,6 +107,11 @@ void WayScale::move(const Rigid3& cur_from_prev, double time_s, double pixel_uni
     restart(time_s);
     return;
   }
+  const auto waits = [](const Queue& queue) { return !queue.waiting.empty(); };
+  if (std::exchange(has_heard_, false) || std::ranges::any_of(queues_, waits)) {
+    const double silence_s = time_s - std::exchange(last_heard_s_, time_s);
+    longest_silence_s_ = last_ ? std::max(longest_silence_s_, silence_s) : longest_silence_s_;
+  }
   pixel_units_ = pixel_units;
   now_from_station_ = cur_from_prev * now_from_station_;
   const double moved = now_from_station_.translation.norm();
@@ -149,9 +154,9 @@ bool WayScale::measure(Queue& queue, ScaleFilter& filter) {
   const double drift = kMapDrift * (stations_.back().time_s - 0.5 * (way.from_s + way.to_s));
   const double sigma = std::hypot(way.sigma_m / way.metres, drift,
                                   std::sqrt(2.0) * kPlace_px * pixel_units_ / units);
-  const bool is_believed = filter.update(std::log(way.metres / units), sigma, ScaleWitness::kWay);
-  last_from_s_ = way.from_s;
-  last_to_s_ = way.to_s;
+  told_ = std::log(way.metres / units);
+  const bool is_believed = filter.update(*told_, sigma, ScaleWitness::kWay);
+  last_ = last_ && last_->to_s > way.to_s ? last_ : way;
   joined.reset();
   return is_believed;
 }
@@ -183,6 +188,7 @@ void WayScale::guess(ScaleFilter& filter) const {
 
 bool WayScale::measure(ScaleFilter& filter) {
   bool is_believed = false;
+  told_.reset();
   if (!stations_.empty()) {
     for (Queue& queue : queues_) {
       is_believed = measure(queue, filter) || is_believed;

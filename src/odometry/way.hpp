@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <deque>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -13,8 +15,8 @@
 
 namespace stemvo {
 
-/// Drift of log(metres per unit) in a second, steadily, since the middle of a way: turns and starts
-/// of real clips show so much over a second or two.
+/// Steady drift of log(metres per unit) in a second: turns and starts of real clips show so much
+/// over a second or two.
 inline constexpr double kMapDrift = 0.025;
 
 /// A length of the camera's path that somebody else measured.
@@ -89,17 +91,25 @@ class WayScale {
       if (way.kind == Way::Kind::kHeld) {
         held_ = way;
       } else {
+        has_heard_ = true;
+        longest_silence_s_ = std::max(longest_silence_s_, way.to_s - way.from_s);
         queues_[static_cast<std::size_t>(way.kind)].waiting.push_back(way);
       }
     }
   }
-  /// Since the last way that was measured: its middle, its end.
+  /// Since the middle of the last way that was measured.
   [[nodiscard]] double age_s(double now_s) const {
-    return now_s - 0.5 * (last_from_s_ + last_to_s_);
+    return last_ ? now_s - 0.5 * (last_->from_s + last_->to_s)
+                 : std::numeric_limits<double>::infinity();
   }
-  [[nodiscard]] double silent_s(double now_s) const { return now_s - last_to_s_; }
+  /// No way has come for twice as long as it took at most so far, nor does one wait.
+  [[nodiscard]] bool have_ended(double now_s) const {
+    return now_s - last_heard_s_ > 2.0 * longest_silence_s_;
+  }
   /// Gives the filter what the ways that have ended tell. Returns whether one of them was believed.
   bool measure(ScaleFilter& filter);
+  /// log(metres per unit) by the last way measured then; nullopt: none was.
+  [[nodiscard]] const std::optional<double>& told() const { return told_; }
 
  private:
   /// A point of the path, far enough from its neighbours that their distance is known.
@@ -128,8 +138,11 @@ class WayScale {
   std::deque<Station> stations_;
   Rigid3 now_from_station_;
   double pixel_units_ = 0.0;
-  double last_from_s_ = 0.0;  ///< of the last way that was measured
-  double last_to_s_ = 0.0;
+  std::optional<Way> last_;  ///< that was measured
+  std::optional<double> told_;
+  bool has_heard_ = false;     ///< since the last frame
+  double last_heard_s_ = 0.0;  ///< the last frame with which a way came, or for which one waited
+  double longest_silence_s_ = 1.0;
   std::array<Queue, 2> queues_;  ///< between speeds, distances
   std::optional<Way> held_;
 };

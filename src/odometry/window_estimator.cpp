@@ -106,9 +106,14 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
     start = turn ? nearer_pose(start, predict(turn), seen, camera()) : start;
   }
   const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
-  // What passes hides the landmarks; more of the rest stands than agrees with another pose.
+  // What passes hides the landmarks: more tracks stand than landmarks are left for another pose.
+  // One frame of a camera that moves off ends it.
   if (!still_px &&
       num_standing(frame, now) > std::max(found ? found->num_inliers : 0, options_.min_inliers)) {
+    for (std::size_t i = 0; i < localized.inlier_mask.size(); ++i) {
+      const double flow_px = (frame.matches.cur_uv[i] - frame.matches.prev_uv[i]).norm();
+      localized.inlier_mask[i] = flow_px < min_flow_px() ? localized.inlier_mask[i] : char{0};
+    }
     return FrameState::kStationary;
   }
   if (found.has_value()) {

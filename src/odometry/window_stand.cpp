@@ -73,8 +73,8 @@ std::optional<double> most_likely(std::vector<ToldLength> lengths) {
 
 /// Who passes has hidden what was seen when the stand began: what was seen last takes its place.
 void WindowEstimator::renew_stand(const Observations& now) {
-  const auto num_common = std::ssize(common_points(moving_view_.points, now).cur_uv);
-  if (stood_ && !stand_.points.empty() && num_common < options_.min_inliers) {
+  if (stood_ && !stand_.points.empty() &&
+      std::ssize(common_points(moving_view_.points, now).cur_uv) < options_.min_inliers) {
     moving_view_.points = stand_.points;
   }
 }

@@ -147,58 +147,94 @@ TEST_P(MetricScaleOf, AnImageThatIsMissingHoldsTheScale) {
       2.0 * kStep_m, 0.05 * kStep_m);
 }
 
-struct BesideARoad {
-  double metres_per_m = 1.0;
-  FrameResult last;
-};
-
 /// A drive whose speed is given, beside a road whose height is said to be `said` times the true
 /// one. Landmarks lie `ratio` times as far below the camera as the road does.
-BesideARoad scale_beside_a_road(double said,
-                                double ratio,
-                                int num_frames = 30,
-                                int num_speeds = 30) {
-  const RoadDrive drive(num_frames);
-  Options config = metric_config();
-  const double height_m = config.scale.camera_height_m;
-  config.scale.camera_height_m = said * height_m;
-  MetricScale scale(config);
-  WayInput input{ScaleSource::kCameraHeight};
-  double units_per_m = 1.0;
-  scale.restart(drive.road_image(0, true).get(), 0.0);
-  for (int i = 1; i < num_frames; ++i) {
-    EXPECT_TRUE(i >= num_speeds || input.add_speed(0.1 * (i - 0.5), 10.0 * kStep_m, 0.4));
-    scale.add(input.take(0.1 * i));
-    std::vector<RoadLandmark> landmarks;
-    const double below = ratio * height_m * units_per_m;
-    for (int k = 0; k < 8; ++k) {
-      landmarks.push_back({{0.02 * k * below, below, (5.0 + 0.8 * k) * below}, 0.02});
+struct BesideARoad {
+  double said = 1.0;
+  double ratio = 1.0;
+  int num_frames = 30;
+  int num_speeds = 30;   ///< then they end
+  int late = 0;          ///< frames
+  int unknown_at = -1;   ///< the map is not known on this frame
+  int wrong_from = 999;  ///< from here on the landmarks lie 1.6 times as far below
+
+  double metres_per_m = 1.0;
+  FrameResult last;
+  int num_said = 0;  ///< frames that say the contradiction
+  int num_new = 0;
+
+  BesideARoad& run() {
+    const RoadDrive drive(num_frames);
+    Options config = metric_config();
+    const double height_m = config.scale.camera_height_m;
+    config.scale.camera_height_m = said * height_m;
+    MetricScale scale(config);
+    WayInput input{ScaleSource::kCameraHeight};
+    scale.restart(drive.road_image(0, true).get(), 0.0);
+    for (int i = 1; i < num_frames; ++i) {
+      const int given = i - late;
+      EXPECT_TRUE(given < 1 || given >= num_speeds ||
+                  input.add_speed(0.1 * (given - 0.5), 10.0 * kStep_m, 0.4));
+      scale.add(input.take(0.1 * i));
+      const double below = (i < wrong_from ? ratio : 1.6) * height_m * metres_per_m;
+      std::vector<RoadLandmark> landmarks;
+      for (int k = 0; k < 8; ++k) {
+        landmarks.push_back({{0.02 * k * below, below, (5.0 + 0.8 * k) * below}, 0.02});
+      }
+      const Rigid3 motion(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * metres_per_m});
+      if (i == unknown_at) {
+        scale.set_unknown("no map");
+      } else {
+        metres_per_m *=
+            scale.measure(drive.road_image(i, true).get(), motion, 0.1 * i, 0.01, landmarks);
+      }
+      last = {};
+      scale.report(last);
+      num_said += last.road_reason == kRoadContradicted ? 1 : 0;
+      num_new += last.is_scale_new ? 1 : 0;
     }
-    const Rigid3 motion(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * units_per_m});
-    units_per_m *= scale.measure(drive.road_image(i, true).get(), motion, 0.1 * i, 0.01, landmarks);
+    return *this;
   }
-  BesideARoad result{units_per_m, {}};
-  scale.report(result.last);
-  return result;
-}
+};
 
 TEST(MetricScale, ARoadThatIsNotProvenDoesNotBendWhatSpeedsMeasure) {
-  EXPECT_NEAR(scale_beside_a_road(1.08, 1.6).metres_per_m, 1.0, 0.01);
-  const BesideARoad joined = scale_beside_a_road(1.08, 1.0);
-  EXPECT_GT(joined.metres_per_m, 1.02) << "one that is believed is joined with them";
-  EXPECT_EQ(joined.last.road_reason, "");
+  EXPECT_NEAR((BesideARoad{.said = 1.08, .ratio = 1.6}.run().metres_per_m), 1.0, 0.01);
+  BesideARoad joined{.said = 1.03};
+  EXPECT_GT(joined.run().metres_per_m, 1.01) << "one that is believed is joined with them";
+  EXPECT_EQ(joined.num_said, 0);
 }
 
 TEST(MetricScale, ASpeedWinsOverARoadThatContradictsItAndItIsSaid) {
   for (const double said : {0.8, 1.25}) {
-    const BesideARoad apart = scale_beside_a_road(said, 1.0);
-    EXPECT_EQ(apart.last.road_reason, kRoadContradicted) << said;
-    EXPECT_NEAR(apart.metres_per_m, 1.0, 0.03) << said;
-    EXPECT_NEAR(apart.last.scale_sigma.value_or(0.0), std::abs(std::log(said)), 0.05) << said;
+    for (const int late : {0, 20}) {
+      BesideARoad apart{.said = said, .num_frames = late + 35, .num_speeds = 99, .late = late};
+      apart.run();
+      EXPECT_EQ(apart.last.road_reason, kRoadContradicted) << said << ", " << late;
+      EXPECT_GE(apart.num_said, 10) << said << ", " << late;
+      EXPECT_LE(apart.num_new, 1) << said << ", " << late;
+      EXPECT_NEAR(apart.metres_per_m, 1.0, 0.03) << said << ", " << late;
+      EXPECT_NEAR(apart.last.scale_sigma.value_or(0.0), std::abs(std::log(said)), 0.06) << said;
+    }
   }
-  const BesideARoad after = scale_beside_a_road(1.25, 1.0, 45, 18);
-  EXPECT_EQ(after.last.road_reason, "") << "the speeds have ended";
-  EXPECT_NEAR(after.metres_per_m, 1.25, 0.03);
+}
+
+TEST(MetricScale, WhatHasEndedContradictsARoadNoLonger) {
+  BesideARoad ended{.said = 1.25, .num_frames = 45, .num_speeds = 18};
+  ended.run();
+  EXPECT_EQ(ended.last.road_reason, "");
+  EXPECT_NEAR(ended.metres_per_m, 1.25, 0.03);
+  EXPECT_EQ(ended.num_new, 1);
+
+  BesideARoad unknown{.said = 1.25, .num_frames = 45, .num_speeds = 18, .unknown_at = 20};
+  unknown.run();
+  EXPECT_EQ(unknown.last.road_reason, "");
+  EXPECT_NEAR(unknown.metres_per_m, 1.25, 0.03);
+
+  BesideARoad none{.said = 1.25, .num_frames = 45, .num_speeds = 99, .wrong_from = 20};
+  none.run();
+  EXPECT_THAT(std::string(none.last.road_reason), HasSubstr("landmarks"));
+  EXPECT_LT(none.last.scale_sigma.value_or(1.0), 0.2) << "what was no road is forgotten";
+  EXPECT_NEAR(none.metres_per_m, 1.0, 0.03);
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes,

@@ -208,7 +208,7 @@ TEST(WayInput, RefusesWhatIsNoMeasurementAndSaysWhy) {
     return message_of(ways.add_speed(time_s, metres_per_s, sigma));
   };
   EXPECT_THAT(speed(kNan, 1.0, 0.1), HasSubstr("speed: expected a finite number of seconds"));
-  EXPECT_THAT(speed(0.0, kNan, 0.1), HasSubstr("expected at most 1000 m/s, found nan"));
+  EXPECT_THAT(speed(0.0, kNan, 0.1), HasSubstr("expected -1000 to 1000 m/s, found nan"));
   EXPECT_THAT(speed(0.0, 1.0, 0.0), HasSubstr("expected a sigma above 0, found 0"));
   EXPECT_THAT(speed(0.0, 1.0, kNan), HasSubstr("expected a sigma above 0, found nan"));
   EXPECT_EQ(speed(1.0, -1.0, 0.1), "no error");
