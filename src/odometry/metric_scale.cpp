@@ -19,13 +19,11 @@ constexpr double kTrack_px = 0.7;     ///< error of a track over the window
 /// Road and ways that differ by more, and by so many sigmas, are not both right.
 constexpr double kContradiction = 0.04;
 constexpr double kContradictionSigmas = 3.0;
-/// What a road said that is no longer believed is forgotten by 1 / e.
-constexpr double kForgotten_s = 5.0;
+constexpr double kForgotten_s = 5.0;  ///< by 1 / e: what a road said that is not believed now
 /// The map does not drift as fast for longer; and a road sees most of it.
 constexpr double kMaxAge_s = 10.0;
 constexpr double kMaxAgeBesideRoad_s = 0.8;
-/// Ways are compared with the road by the mean of so few: 1 / this.
-constexpr double kFewCompared = 0.1;
+constexpr double kFewCompared = 0.1;  ///< the mean of ten ways is compared with the road
 /// Where a way says what the road's scale is, the road is searched for as far around it.
 constexpr double kSearchSigma = 0.3;
 
@@ -146,8 +144,8 @@ double MetricScale::measure(const RoadImage* road,
                                                    : ScaleState::kNone;
   ++num_frames_;
   const bool is_proven = is_scale_proven_ || is_road_believed_ || is_way_measured_;
-  is_scale_new_ =
-      is_proven && num_frames_ > kMaxGuessed && std::abs(filter_.log_scale()) > kNewLogScale;
+  is_scale_new_ = is_proven && (!is_scale_proven_ || is_unit_new_) && num_frames_ > kMaxGuessed &&
+                  std::abs(filter_.log_scale()) > kNewLogScale;
   is_scale_proven_ = is_proven;
   if (!filter_.is_initialized() || (!is_proven && num_frames_ > kMaxGuessed)) {
     return 1.0;

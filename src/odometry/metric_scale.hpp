@@ -103,10 +103,8 @@ class MetricScale {
   bool measure_road(const RoadImage& road,
                     const Rigid3& cur_from_prev,
                     const std::vector<RoadLandmark>& landmarks);
-  /// How far apart road and ways are, if they contradict each other; else 0.
-  [[nodiscard]] double contradiction() const;
-  /// Of the scale that ways measured.
-  [[nodiscard]] double way_sigma() const;
+  [[nodiscard]] double contradiction() const;  ///< how far apart road and ways are; 0: not
+  [[nodiscard]] double way_sigma() const;      ///< of the scale that ways measured
 
   ScaleFilter filter_;
   /// What the road says by itself: told where to look by ways, it would find what they say.

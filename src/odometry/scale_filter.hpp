@@ -49,8 +49,7 @@ class ScaleFilter {
   [[nodiscard]] bool is_initialized() const { return is_initialized_; }
   [[nodiscard]] double log_scale() const { return log_scale_; }
   [[nodiscard]] double sigma() const { return sigma_; }
-  /// Between ways a map may drift by more than it mostly does: so many times `sigma` is the error,
-  /// by the last ways' distances (at most 5).
+  /// So many times `sigma` is the error, by the distances of the last ways (at most 5).
   [[nodiscard]] double way_sigma_factor() const { return std::sqrt(std::max(1.0, way_distance2_)); }
 
  private:

@@ -108,7 +108,7 @@ void WayScale::move(const Rigid3& cur_from_prev, double time_s, double pixel_uni
     return;
   }
   const auto waits = [](const Queue& queue) { return !queue.waiting.empty(); };
-  if (std::exchange(has_heard_, false) || std::ranges::any_of(queues_, waits)) {
+  if (std::ranges::any_of(queues_, waits)) {
     const double silence_s = time_s - std::exchange(last_heard_s_, time_s);
     longest_silence_s_ = last_ ? std::max(longest_silence_s_, silence_s) : longest_silence_s_;
   }

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <deque>
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -91,16 +90,14 @@ class WayScale {
       if (way.kind == Way::Kind::kHeld) {
         held_ = way;
       } else {
-        has_heard_ = true;
         longest_silence_s_ = std::max(longest_silence_s_, way.to_s - way.from_s);
         queues_[static_cast<std::size_t>(way.kind)].waiting.push_back(way);
       }
     }
   }
-  /// Since the middle of the last way that was measured.
+  /// Since the middle of the last way that was measured: one was.
   [[nodiscard]] double age_s(double now_s) const {
-    return last_ ? now_s - 0.5 * (last_->from_s + last_->to_s)
-                 : std::numeric_limits<double>::infinity();
+    return now_s - 0.5 * (last_->from_s + last_->to_s);
   }
   /// No way has come for twice as long as it took at most so far, nor does one wait.
   [[nodiscard]] bool have_ended(double now_s) const {
@@ -140,7 +137,6 @@ class WayScale {
   double pixel_units_ = 0.0;
   std::optional<Way> last_;  ///< that was measured
   std::optional<double> told_;
-  bool has_heard_ = false;     ///< since the last frame
   double last_heard_s_ = 0.0;  ///< the last frame with which a way came, or for which one waited
   double longest_silence_s_ = 1.0;
   std::array<Queue, 2> queues_;  ///< between speeds, distances

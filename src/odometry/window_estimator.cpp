@@ -107,7 +107,6 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   }
   const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
   // What passes hides the landmarks: more tracks stand than landmarks are left for another pose.
-  // One frame of a camera that moves off ends it.
   if (!still_px &&
       num_standing(frame, now) > std::max(found ? found->num_inliers : 0, options_.min_inliers)) {
     for (std::size_t i = 0; i < localized.inlier_mask.size(); ++i) {

@@ -32,8 +32,7 @@ Status add_speeds(const RunRequest& request, const FrameSource& sequence, Beside
   }
   beside.ways = input.take(std::numeric_limits<double>::infinity());
   if (beside.ways.empty()) {
-    return fail(fmt::format("{}: expected speeds at most 1.5 s from the next, found none",
-                            request.speeds->string()));
+    return fail("--speed: expected speeds at most 1.5 s from the next, found none");
   }
   beside.note += fmt::format(", {} speeds", rows.size());
   add_line(beside.unit_notes, found.note);
