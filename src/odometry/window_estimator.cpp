@@ -109,10 +109,6 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   // What passes hides the landmarks: more tracks stand than landmarks are left for another pose.
   if (!still_px &&
       num_standing(frame, now) > std::max(found ? found->num_inliers : 0, options_.min_inliers)) {
-    for (std::size_t i = 0; i < localized.inlier_mask.size(); ++i) {
-      const double flow_px = (frame.matches.cur_uv[i] - frame.matches.prev_uv[i]).norm();
-      localized.inlier_mask[i] = flow_px < min_flow_px() ? localized.inlier_mask[i] : char{0};
-    }
     return FrameState::kStationary;
   }
   if (found.has_value()) {
