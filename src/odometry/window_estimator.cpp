@@ -23,10 +23,6 @@ constexpr double kMinLandmarkShare = 0.3;
 constexpr double kMinExplained = 0.5;
 /// A camera that was still is believed to move from so many times the flow on.
 constexpr double kHysteresis = 1.5;
-/// Tracks that do not move are right to so much ..
-constexpr double kTracksNoise_px = 0.05;
-/// .. and a motion along the optical axis moves them less than one to the side.
-constexpr double kHides = 2.0;
 /// So many times the flow of a stationary frame is what errors of landmarks do to one that turns.
 constexpr double kTurnFlow = 3.0;
 /// A track this near moves as the world does, where a thing is the other choice.
@@ -195,24 +191,6 @@ void WindowEstimator::mark_outliers(const Matches& matches,
   }
 }
 
-/// The less parallax, the more the motion model counts: at `parallax` 1 it does not.
-void WindowEstimator::fuse_with_prediction(const Rigid3& before,
-                                           const SeenLandmarks& seen,
-                                           double parallax,
-                                           const std::optional<double>& still_px) {
-  const Matrix6d noise = pose_influences(world_from_camera_.inverse(), seen.points, seen.uv,
-                                         camera(), localization_.loss_px)
-                             .squared_sum();
-  const double weight = std::pow(1.0 - parallax * parallax, 2);
-  std::optional<MotionModel::Hold> hold;
-  if (still_px) {  // what so little flow may hide
-    hold = {before.inverse() * moving_view_.world_from_camera.translation,
-            std::max(*still_px, kTracksNoise_px) * kHides * pixel_units(seen)};
-  }
-  fused_ = motion_.fuse(before.inverse() * world_from_camera_, noise, weight, interval_s_, hold);
-  world_from_camera_ = before * fused_->prev_from_cur;
-}
-
 /// There are no landmarks yet, they are out of view, or the frame shows another scene.
 FrameState WindowEstimator::measure_since_reference(const Frame& frame,
                                                     const Observations& now,
@@ -284,8 +262,7 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
     position = guess.translation;
   } else if (!window_.keyframes.empty() && !is_still) {
     position = predict().translation;
-    moving_s *=
-        std::min(1.0, (position - world_from_camera_.translation).norm() / (speed_ * interval_s_));
+    moving_s = std::min(interval_s_, (position - world_from_camera_.translation).norm() / speed_);
   }
   still_s_ += interval_s_ - moving_s;
   world_from_camera_ = Rigid3(guess.rotation, position);

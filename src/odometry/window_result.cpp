@@ -18,6 +18,10 @@ namespace {
 
 /// A landmark is not put where a keyframe would see it farther off: the path has no jumps.
 constexpr double kMaxPull_px = 2.0;
+/// Tracks that do not move are right to so much ..
+constexpr double kTracksNoise_px = 0.05;
+/// .. and a motion along the optical axis moves them less than one to the side.
+constexpr double kHides = 2.0;
 
 }  // namespace
 
@@ -110,6 +114,24 @@ void WindowEstimator::describe(const Frame& frame, FrameResult& result) {
   result.map_from_world = mapper_.map_from_world();
   result.recognized_frame = recognized_frame_;
   metric_sigma_ = metric_sigma(result);
+}
+
+/// The less parallax, the more the motion model counts: at `parallax` 1 it does not.
+void WindowEstimator::fuse_with_prediction(const Rigid3& before,
+                                           const SeenLandmarks& seen,
+                                           double parallax,
+                                           const std::optional<double>& still_px) {
+  const Matrix6d noise = pose_influences(world_from_camera_.inverse(), seen.points, seen.uv,
+                                         camera(), localization_.loss_px)
+                             .squared_sum();
+  const double weight = std::pow(1.0 - parallax * parallax, 2);
+  std::optional<MotionModel::Hold> hold;
+  if (still_px) {  // what so little flow may hide
+    hold = {before.inverse() * moving_view_.world_from_camera.translation,
+            std::max(*still_px, kTracksNoise_px) * kHides * pixel_units(seen)};
+  }
+  fused_ = motion_.fuse(before.inverse() * world_from_camera_, noise, weight, interval_s_, hold);
+  world_from_camera_ = before * fused_->prev_from_cur;
 }
 
 void WindowEstimator::measure_covariance(const Frame& frame, LocalizedFrame& localized) {

@@ -89,6 +89,31 @@ TEST(WindowEstimator, WhoStandsBehindALorryStays) {
   }
 }
 
+/// Behind a bend only what is infinitely far is seen: the camera goes on as it was seen to,
+/// unmeasured.
+TEST(WindowEstimator, WithoutAMapAndParallaxThePositionGoesOn) {
+  const Rigid3 step(so3_exp({0.0, 0.003, 0.0}), {0.0, 0.0, 0.8});
+  const std::vector<Rigid3> path = DriveTracks::repeat(step, 30);
+  DriveTracks drive(path, points_along(path, 2000, 4), 0.04, 4);
+  for (int i = 20; i < 30; ++i) {
+    auto& seen = drive.observations[static_cast<std::size_t>(i)];
+    seen.clear();
+    for (int k = 0; k < 300; ++k) {
+      const Eigen::Vector3d far(0.1 * (k % 20 - 10), 0.02 * (k / 20 - 8), 1.0);
+      const Eigen::Vector3d here =
+          drive.pose(i).rotation.conjugate() * (drive.pose(20).rotation * far);
+      seen.emplace(100000 + k, drive.camera.project(here));
+    }
+  }
+  Driven d(std::move(drive));
+  d.add_range(0, 30);
+  d.expect_only(23, 30, FrameState::kRotating);
+  for (int i = 21; i < 30; ++i) {
+    EXPECT_FALSE(d.run.results[static_cast<std::size_t>(i)].is_measured) << i;
+    EXPECT_NEAR(d.moved(i - 1, i) / d.moved(18, 19), 1.0, 0.2) << i;
+  }
+}
+
 TEST(WindowEstimator, ATurnThatLosesEveryLandmarkFromViewStaysWhereItIs) {
   const std::vector<Rigid3> path =
       path_with(Rigid3(so3_exp({0.0, 2.5 * kDeg, 0.0}), Eigen::Vector3d::Zero()), 44);
