@@ -67,11 +67,11 @@ def order(row):
 
 def draw(stem, table, most=40):
     """Errors over those of the best, with intervals: what leaves out 1 is worse."""
-    from stemvo.lab import figures
-
     rows = [row for row in table if row["status"] == "ranked" and np.isfinite(row["over_best_high"])][:most]
     if not rows:
         return
+    from stemvo.lab import figures
+
     figure, (axis,) = figures.sheet(1, height_in=0.8 + 0.2 * len(rows))
     for at, row in enumerate(rows):
         color = "C7" if row["baseline"] else "C0" if row["equal"] else "C1"

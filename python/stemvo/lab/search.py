@@ -119,6 +119,7 @@ class Search:
                 if self.row((layer, k), drive, share) is None:
                     tasks[self._blocks[layer, k, drive]].append((layer, k))
         todo = [(block, tuple(k for _, k in found), self.end(block.drive, share)) for block, found in tasks.items()]
+        todo.sort(key=lambda task: -len(task[1]) * task[2])  # a long one begun last would run alone
         for (block, filters, end), scored in work.run(self.workers, score.score, todo, lambda task: task[0], self._kept):
             layers = dict((k, layer) for layer, k in tasks[block])
             self.rows.append([dict(zip(KEY, self.key((layers[k], k), block.drive, share))) | row | {"model": layers[k].name} for k, row in scored.items()])
@@ -220,7 +221,7 @@ def write_results(out, table):
 @click.option("--held-out-frames", help="A:B of these.")
 @click.option("--kinds", default="", help="Each drive ranks also under these disturbances (stemvo-lab robustness), KIND,..")
 @click.option("--filters", help="A:B, A: or :B, which each model must have.")
-@click.option("--shard", help="I/N: the I-th of N parts of the filters.")
+@click.option("--shard", default="0/1", help="I/N: the I-th of N parts of the filters.")
 @click.option("--exhaustive", is_flag=True, help="No filter is stopped early.")
 @click.option("--baselines/--no-baselines", default=True, help="ORB on gray, and the input's R, G and B.")
 @click.option("--config", help="Configuration in place of the search's own cheap one.")
@@ -245,8 +246,7 @@ def command(drives, models, out, frames, held_out, held_out_frames, kinds, filte
         raise ValueError(f"DRIVE: expected each name once, found {twice[0][0]} twice")
     if planned:
         return click.echo(plan(planned, layers, seen, jobs or len(os.sched_getaffinity(0))))
-    candidates = [(layer, k) for layer in layers if not layer.is_baseline for k in filters_of(layer, filters or ":")]
-    candidates = part_of(candidates, shard) if shard else candidates
+    candidates = part_of([(layer, k) for layer in layers if not layer.is_baseline for k in filters_of(layer, filters or ":")], shard)
     candidates += [(layer, k) for layer in layers if layer.is_baseline for k in range(layer.num_filters)]
     open_folder(out, "search", [*(f"{drive}/times.txt" for drive in (*drives, *held_out)), *models, *others, config])
     rows = Rows(out / "rows.csv", COLUMNS, len(KEY), others)

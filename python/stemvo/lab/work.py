@@ -6,6 +6,7 @@ import contextlib
 import importlib.util
 import multiprocessing
 import os
+import threading
 
 from stemvo import _core
 
@@ -40,9 +41,7 @@ class Actors:
     """The same on Ray: an actor whose node is lost begins again on another one."""
 
     def __init__(self, jobs, address):
-        import ray
-
-        self._ray = ray
+        self._ray = ray = importlib.import_module("ray")
         # Without "local" Ray would join any cluster that happens to run on this machine.
         ray.init(address=address or "local", num_cpus=None if address else jobs, include_dashboard=False, logging_level="error", log_to_driver=False)
         actor = ray.remote(max_restarts=-1, max_task_retries=-1, scheduling_strategy="SPREAD")(_Actor)
@@ -77,6 +76,7 @@ def workers(jobs=None, address=None, ray=True):
     on_ray = ray and importlib.util.find_spec("ray") is not None
     if address and not on_ray:
         raise ValueError("--address: expected Ray to be installed, found none")
+    threading.Thread(target=importlib.import_module, args=["pandas"]).start()  # of the tables: a second, while workers start
     made = Actors(jobs if address else jobs or len(os.sched_getaffinity(0)), address) if on_ray else Processes(jobs or len(os.sched_getaffinity(0)))
     with contextlib.closing(made):
         yield made
