@@ -212,6 +212,16 @@ TEST(RoadBelief, AGoodRoadIsBelievedWithinAFewFramesNotAtOnce) {
   EXPECT_LT(frames_until(true, {}, plain), 15);
 }
 
+TEST(RoadBelief, AFrameIsWorthTheWayToItWhateverTheRate) {
+  RoadEvidence slow = good_frame();
+  slow.travelled = 0.02;  // a hand in a room; a third of a height is a frame of a car
+  EXPECT_GT(frames_until(true, {}, slow), 10 * frames_until(true, {}, good_frame()));
+  RoadEvidence below = slow;
+  below.num_on = 5;
+  below.num_below = 8;
+  EXPECT_GT(frames_until(false, believed(), below), 40);
+}
+
 TEST(RoadBelief, EachContradictionKeepsARoadFromBeingBelieved) {
   RoadEvidence below = good_frame();
   below.num_on = 5;

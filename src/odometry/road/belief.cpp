@@ -8,7 +8,6 @@
 #include <utility>
 
 namespace stemvo {
-
 namespace {
 
 // Log-odds: believed from 55 : 1 on, no longer at 1 : 1. The lower bound is farther away: who was
@@ -27,6 +26,8 @@ constexpr double kAbove = -0.85;
 constexpr double kLandmarkShare = 0.15;
 constexpr double kMostOfLandmarks = 0.75;
 constexpr double kLeastOfLandmarks = -1.5;
+/// Who has moved by so many heights of the camera sees another piece of road; less is worth less.
+constexpr double kNewRoad = 0.3;
 // Neighbouring frames share road and errors: each is worth a part of its chi-square.
 constexpr double kContinuous = 0.35;
 constexpr double kContinuousChi2 = 4.5;  ///< of an innovation that says nothing
@@ -97,6 +98,7 @@ void RoadBelief::add(const RoadEvidence& e) {
   if (!is_measured && e.is_in_sight && !is_believed_) {
     sum += std::clamp(kLeastUnmeasured - log_odds_, kUnmeasured, 0.0);
   }
+  sum *= std::min(1.0, e.travelled / kNewRoad);
   log_odds_ = std::clamp(log_odds_ + sum, kLeast, kMost);
   if (sum < 0.0) {
     const auto worst = std::min_element(told.begin(), told.end());

@@ -28,6 +28,7 @@ struct RoadEvidence {
   std::optional<double> correlation;  ///< of the images, more than without the plane
   double profile_chi2 = 0.0;  ///< slope and bend against the way driven; 2 degrees of freedom
   double roll_chi2 = 0.0;     ///< against a camera that stands upright
+  double travelled = 1.0;     ///< since the frame before, heights of the camera
 };
 
 /// Weighs whether the plane that is measured is the road under the camera: log-odds, the sum of

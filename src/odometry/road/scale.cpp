@@ -175,6 +175,7 @@ RoadScaleEstimate RoadScale::measure(const Past& past,
     prior.drop = best.drop;
   }
   count(landmarks, past.now_from_past, prior, evidence);
+  evidence.travelled = path_.front().norm() * std::exp(prior.log_scale) / options_.camera_height_m;
   belief_.add(evidence);
   const bool is_near =
       joined.num > 0 && filter.update(joined.log_scale, joined.sigma, ScaleWitness::kRoad);
