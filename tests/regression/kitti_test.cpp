@@ -163,5 +163,21 @@ TEST_F(HandHeld, ARoomHasNoRoad) {
   EXPECT_LE(metrics_of(folder_ / "result")["ate_rmse_m"]["sim3"], 0.03) << "one unit";
 }
 
+TEST_F(HandHeld, ARoomUpsideDownHasNoRoad) {
+  const fs::path clip = shared_data() / "handheld";
+  fs::create_directories(folder_.path() / "images");
+  fs::copy(clip / "camera.yaml",
+           folder_.path() / "camera.yaml");  // its center is the image's, but for half a pixel
+  for (const auto& entry : fs::directory_iterator(clip / "images")) {
+    cv::Mat image = cv::imread(entry.path().string());
+    cv::rotate(image, image, cv::ROTATE_180);
+    cv::imwrite((folder_.path() / "images" / entry.path().filename()).string(), image);
+  }
+  const auto done =
+      run_stemvo({"run", folder_.path().string(), "--out", folder_ / "result", "--quiet", "--set",
+                  "scale.source=camera_height", "--set", "scale.camera_height_m=1.5"});
+  EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
+}
+
 }  // namespace
 }  // namespace stemvo
