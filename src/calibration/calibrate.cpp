@@ -22,7 +22,6 @@
 #include "try.hpp"
 
 namespace stemvo {
-
 namespace fs = std::filesystem;
 
 namespace {

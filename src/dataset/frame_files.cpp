@@ -13,7 +13,6 @@
 #include "try.hpp"
 
 namespace stemvo::dataset {
-
 namespace fs = std::filesystem;
 
 namespace {

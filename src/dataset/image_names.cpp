@@ -17,7 +17,6 @@
 #include "try.hpp"
 
 namespace stemvo::dataset {
-
 namespace fs = std::filesystem;
 
 namespace {

@@ -12,7 +12,6 @@
 #include "try.hpp"
 
 namespace stemvo::dataset {
-
 namespace fs = std::filesystem;
 
 namespace {

@@ -18,7 +18,6 @@
 #include "try.hpp"
 
 namespace stemvo::dataset {
-
 namespace fs = std::filesystem;
 
 namespace {

@@ -16,7 +16,6 @@
 #include "try.hpp"
 
 namespace stemvo {
-
 namespace fs = std::filesystem;
 
 namespace {

@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 namespace stemvo::io {
-
 namespace fs = std::filesystem;
 
 Expected<void*> load_symbol(const std::string& module, const char* symbol, std::string_view what) {

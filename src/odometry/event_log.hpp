@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "odometry/metric_scale.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/odometry.hpp"
 
@@ -55,6 +56,11 @@ class EventLog {
                        : "the scale is doubted: lengths are a guess");
     }
     is_scale_believed_ = is_believed;
+    const bool was_contradicted =
+        std::exchange(is_contradicted_, result.road_reason == kRoadContradicted);
+    if (is_contradicted_ && !was_contradicted) {
+      tell(LogLevel::kWarning, result, "road and speeds contradict each other");
+    }
   }
   void tell(LogLevel level, const FrameResult& result, const std::string& text) const {
     if (log_) {
@@ -66,6 +72,7 @@ class EventLog {
   bool has_map_ = false;
   bool is_lost_ = false;
   bool is_scale_believed_ = false;
+  bool is_contradicted_ = false;
   std::string problem_;  ///< of the last frame
 };
 

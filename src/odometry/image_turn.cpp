@@ -65,6 +65,7 @@ struct Template {
       Eigen::Array<float, 8, 1>;       ///< by the turn (3), by gain, by bias; 5: the error's place
   std::vector<Eigen::Vector2f> plane;  ///< where z = 1
   std::vector<Row> rows;
+  double sum = 0.0;  ///< of the values
 
   [[nodiscard]] float value(std::size_t i) const { return -rows[i][3]; }
 
@@ -83,6 +84,7 @@ struct Template {
         const Eigen::Vector2f at = plane.emplace_back(
             (Eigen::Array2f(static_cast<float>(x), static_cast<float>(y)) - level.center_px) /
             level.focal_px);
+        sum += value;
         const float along = fx * at.x() + fy * at.y();
         rows.emplace_back() << -fy - along * at.y(), fx + along * at.x(), fy * at.x() - fx * at.y(),
             -value, -1.0F, 0.0F, 0.0F, 0.0F;
@@ -139,14 +141,6 @@ double mean_of(const Level& level) {
   return cv::mean(level.pixels, level.pixels == level.pixels)[0];
 }
 
-double mean_of(const Template& level) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < level.rows.size(); ++i) {
-    sum += level.value(i);
-  }
-  return sum / static_cast<double>(level.rows.size());
-}
-
 /// Gauss-Newton from `turn`, cur_from_prev; gain and bias of the gray values are solved for, and
 /// what differs by more than the others (Cauchy) counts less. Returns the error of the direction
 /// that is told worst, 1 sigma, pixels.
@@ -155,7 +149,7 @@ double align_level(const Template& prev, const Level& cur, Eigen::Quaterniond& t
   using Matrix5d = Eigen::Matrix<double, 5, 5>;
   constexpr double kUnknown = std::numeric_limits<double>::infinity();
   double gain = 1.0;
-  double bias = mean_of(cur) - mean_of(prev);
+  double bias = mean_of(cur) - prev.sum / static_cast<double>(prev.rows.size());
   double scale = kUnknown;
   double sigma_px = kUnknown;
   for (int i = 0; i < kIterations; ++i) {
@@ -243,11 +237,6 @@ Eigen::Quaterniond best_shift(const Level& prev, const Level& cur) {
 }  // namespace
 
 std::vector<Level> ImageTurn::small_levels(const ImagePyramid& image) const {
-  const auto halved = [](const cv::Mat& pixels) {
-    cv::Mat half;
-    cv::pyrDown(pixels, half);
-    return half;
-  };
   cv::Mat pixels = image.levels.front();
   for (const cv::Mat& level : image.levels) {
     if (level.cols >= kMinWidth_px) {
@@ -255,7 +244,7 @@ std::vector<Level> ImageTurn::small_levels(const ImagePyramid& image) const {
     }
   }
   while (pixels.cols >= 2 * kMinWidth_px) {
-    pixels = halved(pixels);
+    cv::pyrDown(pixels, pixels);
   }
   double scale = std::exp2(std::round(std::log2(static_cast<double>(image.channel.pixels.cols) /
                                                 static_cast<double>(pixels.cols))));
@@ -276,7 +265,7 @@ std::vector<Level> ImageTurn::small_levels(const ImagePyramid& image) const {
     if (values.size().area() <= kMaxCoarsest) {
       return levels;
     }
-    pixels = halved(pixels);
+    cv::pyrDown(pixels, pixels);
     scale *= 2.0;
   }
 }

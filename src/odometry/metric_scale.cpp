@@ -72,7 +72,10 @@ double MetricScale::contradiction() const {
 double MetricScale::way_sigma() const {
   const double longest_s = is_road_believed_ && apart_ == 0.0 ? kMaxAgeBesideRoad_s : kMaxAge_s;
   const double drift = kMapDrift * std::min(ways_.age_s(last_time_s_), longest_s);
-  return std::min(std::hypot(filter_.way_sigma_factor() * filter_.sigma(), drift, apart_),
+  // Two that differ a little are joined: the truth may be where one of them is.
+  const double between = is_road_believed_ && num_compared_ > 0 ? 0.5 * way_from_road_ : 0.0;
+  const double sigma = std::hypot(filter_.way_sigma_factor() * filter_.sigma(), drift);
+  return std::min(std::hypot(sigma, std::max(apart_, std::abs(between)), filter_.wander()),
                   ScaleFilter::kUnknownSigma);
 }
 
@@ -93,15 +96,11 @@ bool MetricScale::measure_road(const RoadImage& road,
   }
   if (is_way_measured_ && estimate.is_measured) {
     if (ways_.have_ended(last_time_s_)) {
-      is_way_measured_ = false;
+      is_way_measured_ = false;  // if the two were apart, they still are
       is_unit_new_ = true;
-      apart_ = 0.0;
       num_compared_ = 0;
       filter_ = road_filter_;
-    } else {
-      apart_ = contradiction();
-    }
-    if (apart_ > 0.0) {
+    } else if (apart_ = contradiction(); apart_ > 0.0) {
       reason_ = kRoadContradicted;
       return false;
     }
@@ -119,6 +118,7 @@ double MetricScale::measure(const RoadImage* road,
                             double pixel_units,
                             const std::vector<RoadLandmark>& landmarks) {
   ways_.move(cur_from_prev, time_s, pixel_units);
+  ++num_frames_;
   const double interval_s = time_s - std::exchange(last_time_s_, time_s);
   if (!has_ways_ && (!road_.has_value() || road == nullptr)) {
     return 1.0;
@@ -142,7 +142,6 @@ double MetricScale::measure(const RoadImage* road,
   state_ = is_measured || is_way_measured          ? ScaleState::kMeasured
            : is_road_believed_ || is_way_measured_ ? ScaleState::kHeld
                                                    : ScaleState::kNone;
-  ++num_frames_;
   const bool is_proven = is_scale_proven_ || is_road_believed_ || is_way_measured_;
   is_scale_new_ = is_proven && (!is_scale_proven_ || is_unit_new_) && num_frames_ > kMaxGuessed &&
                   std::abs(filter_.log_scale()) > kNewLogScale;

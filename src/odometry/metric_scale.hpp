@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -93,7 +94,7 @@ class MetricScale {
     result.is_scale_new = result.is_scale_new || is_scale_new_;
     if (is_enabled()) {
       result.scale_sigma = is_way_measured_    ? way_sigma()
-                           : is_road_believed_ ? road_->sigma(filter_)
+                           : is_road_believed_ ? std::hypot(road_->sigma(filter_), apart_)
                                                : ScaleFilter::kUnknownSigma;
     }
   }

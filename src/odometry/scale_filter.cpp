@@ -4,7 +4,6 @@
 #include <algorithm>
 
 namespace stemvo {
-
 namespace {
 
 constexpr double kHuber = 1.5;
@@ -26,7 +25,13 @@ constexpr double kFirstSigma = 0.1;
 constexpr double kWayDrift = 0.02;
 constexpr double kDistanceGain = 0.1;
 constexpr double kMaxDistance2 = 25.0;
-constexpr double kTrend_s = 10.0;  ///< a trend that nothing confirms is forgotten by 1 / e
+/// The scale against its mean over two seconds: a map's drift takes it so far, what contradicts the
+/// motion (speeds of another second) farther. Not before it is known that well.
+constexpr double kMean_s = 2.0;
+constexpr double kSteady = 0.04;
+constexpr double kSettled = 0.03;
+constexpr double kForgotten_s = 3.0;  ///< by 1 / e
+constexpr double kTrend_s = 10.0;     ///< a trend that nothing confirms is forgotten by 1 / e
 
 }  // namespace
 
@@ -34,6 +39,9 @@ void ScaleFilter::predict(double interval_s) {
   sigma_ = std::min(std::hypot(sigma_, std::sqrt(interval_s) * drift_sigma_), kUnknownSigma);
   log_scale_ += interval_s * trend_;
   trend_ *= std::exp(-interval_s / kTrend_s);
+  from_mean_ = (from_mean_ + interval_s * trend_) * std::exp(-interval_s / kMean_s);
+  wander_ =
+      std::max(wander_ * std::exp(-interval_s / kForgotten_s), std::abs(from_mean_) - kSteady);
   for (Record& one : records_) {
     one.since_s += interval_s;
   }
@@ -77,6 +85,7 @@ bool ScaleFilter::update(double log_scale, double sigma, ScaleWitness witness) {
   }
   record(witness).since_s = 0.0;
   log_scale_ += gain * innovation;
+  from_mean_ = sigma_ > kSettled ? 0.0 : from_mean_ + gain * innovation;
   sigma_ = std::max(sigma_ * std::sqrt(1.0 - gain), is_first ? kFirstSigma : 0.0);
   return distance < kDoubt;
 }

@@ -49,6 +49,8 @@ class ScaleFilter {
   [[nodiscard]] bool is_initialized() const { return is_initialized_; }
   [[nodiscard]] double log_scale() const { return log_scale_; }
   [[nodiscard]] double sigma() const { return sigma_; }
+  /// A change of late that no drift of a map explains: what measured was no measure of the motion.
+  [[nodiscard]] double wander() const { return wander_; }
   /// So many times `sigma` is the error, by the distances of the last ways (at most 5).
   [[nodiscard]] double way_sigma_factor() const { return std::sqrt(std::max(1.0, way_distance2_)); }
 
@@ -72,6 +74,8 @@ class ScaleFilter {
   /// Trend of log_scale_, per second: a map that stretches steadily would stay behind by as much as
   /// the filter is slow. By ways alone, where no road says otherwise.
   double trend_ = 0.0;
+  double from_mean_ = 0.0;         ///< log_scale_, less its mean of the last seconds
+  double wander_ = 0.0;            ///< the most that this was lately, more than by drift
   std::array<Record, 2> records_;  ///< by witness
   double way_distance2_ = 1.0;     ///< mean square of ways' distances, standard deviations
 };

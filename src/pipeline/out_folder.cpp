@@ -14,7 +14,6 @@
 #include "try.hpp"
 
 namespace stemvo::pipeline {
-
 namespace fs = std::filesystem;
 
 namespace {

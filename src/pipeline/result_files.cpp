@@ -21,7 +21,6 @@
 #include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
-
 namespace {
 
 std::string describe_numbers(const MetricsReport& report) {
@@ -47,8 +46,8 @@ std::string describe_frames(const FrameSource& sequence, std::size_t num_frames)
   return one_line(fmt::format("frames {}:{} of {}", begin, end, sequence.name));
 }
 
-bool is_scale_measured(const FrameResult& frame) {
-  return frame.scale_state == ScaleState::kMeasured;
+bool has_metres(const FrameResult& frame) {
+  return frame.scale_state == ScaleState::kMeasured || frame.scale_state == ScaleState::kHeld;
 }
 
 template <typename Predicate>
@@ -206,9 +205,10 @@ class ResultWriter {
     report.filter = run_.odometry.stem_info().filter;
     report.fps = static_cast<double>(trajectory_.size()) / std::max(elapsed.count(), 1e-9);
     report.scale_source = scale_source(config);
-    if (!run_.beside.ways.empty() && std::ranges::any_of(drive_.frames, is_scale_measured)) {
+    if (!run_.beside.ways.empty() && std::ranges::any_of(drive_.frames, has_metres)) {
       report.scale_source =
           config.scale.source == ScaleSource::kNone ? "speed" : report.scale_source + " and speed";
+      report.metric_fraction = share_of(drive_.frames, has_metres);
     }
     report.tracked_fraction = share_of(drive_.frames, std::mem_fn(&FrameResult::is_measured));
     add_maps(drive_.frames, report);
@@ -218,9 +218,7 @@ class ResultWriter {
     if (config.scale.source == ScaleSource::kCameraHeight) {
       report.road_measured_fraction = share_of(
           drive_.frames, [](const FrameResult& frame) { return frame.road_reason.empty(); });
-      report.road_believed_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
-        return is_scale_measured(frame) || frame.scale_state == ScaleState::kHeld;
-      });
+      report.road_believed_fraction = share_of(drive_.frames, has_metres);
       report.road_contradicted_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
         return frame.road_reason == kRoadContradicted;
       });

@@ -18,7 +18,6 @@
 #include "try.hpp"
 
 namespace stemvo {
-
 namespace {
 
 using pipeline::Run;
@@ -106,7 +105,7 @@ Expected<RunSummary> finish_run(const Run& run, const RunProgress& progress) {
   done.warnings.insert(done.warnings.begin(), odd.begin(), odd.end());
   MetricsReport report;
   Status written = pipeline::write_results(run, done, report);
-  add_line(done.warnings, warn_of_road(report));
+  add_line(done.warnings, warn_of_scale(report));
   add_line(done.warnings, warn_of_gaps(report));
   const auto late = run.beside.warnings(done.frames.front().time_s, done.frames.back().time_s);
   done.warnings.insert(done.warnings.end(), late.begin(), late.end());

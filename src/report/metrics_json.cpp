@@ -17,6 +17,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kFewBelieved = 0.5;  ///< a smaller share is warned of
 constexpr double kFewContradicted = 0.05;
+constexpr double kMostMetric = 0.9;
 constexpr double kFewTracked = 0.5;  ///< a smaller share of frames that were measured is, too
 constexpr double kInPlace = 0.95;    ///< a larger share of frames in place is told
 
@@ -247,7 +248,7 @@ std::string warn_of_gaps(const MetricsReport& report) {
                    100.0 * report.tracked_fraction);
 }
 
-std::string warn_of_road(const MetricsReport& report) {
+std::string warn_of_scale(const MetricsReport& report) {
   const double share = report.road_believed_fraction.value_or(1.0);
   return share == 0.0 ? "scale: no road was believed at scale.camera_height_m below the camera; "
                         "the path is in units, not metres"
@@ -261,6 +262,11 @@ std::string warn_of_road(const MetricsReport& report) {
                    "scale: road and speeds contradict each other on {:.1f} % of the frames; the "
                    "speeds are followed (check scale.camera_height_m and the speeds' unit)",
                    100.0 * report.road_contradicted_fraction)
+         : report.metric_fraction < kMostMetric
+             ? fmt::format(
+                   "scale: {:.1f} % of the frames only are in metres, as far as speeds "
+                   "reach; the others' lengths are units (scale_state in frames.csv)",
+                   100.0 * report.metric_fraction)
              : "";
 }
 

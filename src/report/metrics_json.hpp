@@ -59,6 +59,7 @@ struct MetricsReport {
   /// Frames whose scale was in metres: `measured` or `held`; nullopt as above.
   std::optional<double> road_believed_fraction;
   double road_contradicted_fraction = 0.0;  ///< frames whose speed says another scale
+  double metric_fraction = 1.0;             ///< frames in metres, where speeds alone tell them
   std::optional<Metrics> metrics;
   std::optional<MapReport> map;        ///< nullopt: nothing is remembered
   std::optional<TimingReport> timing;  ///< nullopt: nobody asked, and the key is not in the file
@@ -69,8 +70,8 @@ struct MetricsReport {
   }
 };
 
-/// The warning about a road that was believed never, on few frames, or against speeds; else empty.
-[[nodiscard]] std::string warn_of_road(const MetricsReport& report);
+/// The warning about metres of few frames, or of which road and speeds say otherwise; else empty.
+[[nodiscard]] std::string warn_of_scale(const MetricsReport& report);
 /// The same where most of the path is no measurement.
 [[nodiscard]] std::string warn_of_gaps(const MetricsReport& report);
 

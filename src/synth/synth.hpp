@@ -11,7 +11,6 @@
 #include "stemvo/error.hpp"
 
 namespace stemvo {
-
 namespace synth {
 /// How frames of a drive or walk are rendered.
 struct RenderOptions {

@@ -34,7 +34,8 @@ struct TwoRounds {
     // What changed is known only to who describes it by the first map's axes.
     const std::vector<Descriptor> right = keyframe.descriptors;
     keyframe.world_from_camera =
-        Rigid3(so3_exp({0.0, 0.0, axes_rolled_rad}), {}) * keyframe.world_from_camera;
+        Rigid3(so3_exp({0.0, 0.0, axes_rolled_rad}), Eigen::Vector3d::Zero()) *
+        keyframe.world_from_camera;
     const double roll = image_roll_rad(keyframe.world_from_camera.rotation);
     const DescribeAs describe_as = [&](const OtherLook& look) {
       const bool is_right = bits_changed == 0.0 ||

@@ -224,6 +224,8 @@ TEST(MetricScale, WhatHasEndedContradictsARoadNoLonger) {
   EXPECT_EQ(ended.last.road_reason, "");
   EXPECT_NEAR(ended.metres_per_m, 1.25, 0.03);
   EXPECT_EQ(ended.num_new, 1);
+  EXPECT_NEAR(ended.last.scale_sigma.value_or(0.0), std::log(1.25), 0.06)
+      << "one of them was wrong";
 
   BesideARoad unknown{.said = 1.25, .num_frames = 45, .num_speeds = 18, .unknown_at = 20};
   unknown.run();

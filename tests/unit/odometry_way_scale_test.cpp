@@ -106,6 +106,28 @@ TEST(WayScale, LateSpeedsLeaveTheScaleLessSure) {
   EXPECT_LE(drive.num_far_off, 4);
 }
 
+// Clocks differ: the scale swings as the speed does, and no map drifts so.
+TEST(WayScale, SpeedsOfAnotherSecondLeaveTheScaleUnsure) {
+  PlantedDrive drive{.speed = [](double s) { return 8.0 + 4.0 * std::sin(0.7 * s); }};
+  drive.run(400, [&](double now_s) {
+    ASSERT_TRUE(drive.ways.add_speed(now_s, drive.speed(now_s - 1.0), 0.1));
+  });
+  EXPECT_GT(drive.largest_step_error, 0.3);
+  EXPECT_LE(drive.num_far_off, 60) << "of 390";
+}
+
+TEST(WayScale, ASpeedThatComesLateChangesTheUnitAndSaysSo) {
+  PlantedDrive drive;
+  const auto give = speeds(drive, 0.02);
+  drive.run(60, [&](double now_s) {
+    if (now_s > 3.0) {
+      give(now_s);
+    }
+  });
+  EXPECT_EQ(drive.result.scale_state, ScaleState::kMeasured);
+  EXPECT_TRUE(drive.result.is_scale_new);
+}
+
 TEST(WayScale, AMapThatTakesAnothersUnitKeepsMetres) {
   MetricScale scale{Options()};
   WayInput input{ScaleSource::kNone};

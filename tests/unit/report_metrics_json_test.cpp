@@ -129,20 +129,23 @@ TEST(MetricsJson, SurvivesNamesThatAreNotUtf8) {
 
 TEST(MetricsTable, SaysWhereARoadWasBelievedNeverOrSeldom) {
   MetricsReport report = example();
-  EXPECT_EQ(warn_of_road(report), "");
+  EXPECT_EQ(warn_of_scale(report), "");
   EXPECT_FALSE(report.is_up_to_scale());
   report.scale_source = "camera_height";
   report.road_believed_fraction = 0.125;
-  EXPECT_THAT(warn_of_road(report), HasSubstr("12.5 % of the frames only"));
+  EXPECT_THAT(warn_of_scale(report), HasSubstr("12.5 % of the frames only"));
   EXPECT_FALSE(report.is_up_to_scale());
   report.road_believed_fraction = 0.0;
-  EXPECT_THAT(warn_of_road(report), HasSubstr("in units, not metres"));
+  EXPECT_THAT(warn_of_scale(report), HasSubstr("in units, not metres"));
   EXPECT_TRUE(report.is_up_to_scale());
   EXPECT_THAT(format_metrics_table(report), HasSubstr("camera_height, no road believed"));
   report.road_believed_fraction.reset();
-  EXPECT_EQ(warn_of_road(report), "");
+  EXPECT_EQ(warn_of_scale(report), "");
   report.road_contradicted_fraction = 0.4;
-  EXPECT_THAT(warn_of_road(report), HasSubstr("road and speeds contradict each other on 40.0 %"));
+  EXPECT_THAT(warn_of_scale(report), HasSubstr("road and speeds contradict each other on 40.0 %"));
+  report.road_contradicted_fraction = 0.0;
+  report.metric_fraction = 0.45;
+  EXPECT_THAT(warn_of_scale(report), HasSubstr("45.0 % of the frames only are in metres"));
 }
 
 TEST(MetricsTable, SaysThatMostOfThePathIsNoMeasurement) {

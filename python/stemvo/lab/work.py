@@ -11,16 +11,12 @@ import threading
 from stemvo import _core
 
 
-def _one_thread():
-    _core.set_num_threads(1)
-
-
 class Processes:
     """Each worker is a process that lives as long as this does, so that what a task leaves in memory is there for the next one."""
 
     def __init__(self, jobs):
         context = multiprocessing.get_context("spawn")
-        self._pools = [concurrent.futures.ProcessPoolExecutor(1, context, _one_thread) for _ in range(jobs)]
+        self._pools = [concurrent.futures.ProcessPoolExecutor(1, context, _Worker) for _ in range(jobs)]
         self.workers = range(jobs)
 
     def submit(self, worker, function, task):
@@ -44,7 +40,7 @@ class Actors:
         self._ray = ray = importlib.import_module("ray")
         # Without "local" Ray would join any cluster that happens to run on this machine.
         ray.init(address=address or "local", num_cpus=None if address else jobs, include_dashboard=False, logging_level="error", log_to_driver=False)
-        actor = ray.remote(max_restarts=-1, max_task_retries=-1, scheduling_strategy="SPREAD")(_Actor)
+        actor = ray.remote(max_restarts=-1, max_task_retries=-1, scheduling_strategy="SPREAD")(_Worker)
         count = jobs or int(ray.cluster_resources()["CPU"])
         self._actors = [actor.remote() for _ in range(count)]
         self.workers = range(count)
@@ -62,9 +58,9 @@ class Actors:
         self._ray.shutdown()
 
 
-class _Actor:
+class _Worker:
     def __init__(self):
-        _one_thread()
+        _core.set_num_threads(1)
 
     def call(self, function, task):
         return function(task)
@@ -77,8 +73,8 @@ def workers(jobs=None, address=None, ray=True):
     if address and not on_ray:
         raise ValueError("--address: expected Ray to be installed, found none")
     threading.Thread(target=importlib.import_module, args=["pandas"]).start()  # of the tables: a second, while workers start
-    made = Actors(jobs if address else jobs or len(os.sched_getaffinity(0)), address) if on_ray else Processes(jobs or len(os.sched_getaffinity(0)))
-    with contextlib.closing(made):
+    count = jobs if address else jobs or len(os.sched_getaffinity(0))
+    with contextlib.closing(Actors(count, address) if on_ray else Processes(count)) as made:
         yield made
 
 

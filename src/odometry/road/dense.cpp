@@ -11,7 +11,6 @@
 #include "odometry/road/region.hpp"
 
 namespace stemvo {
-
 namespace {
 
 constexpr double kMinTileCorrelation = 0.2;

@@ -8,7 +8,6 @@
 #include "stem/stem.hpp"
 
 namespace stemvo {
-
 namespace {
 
 /// Reach of the local contrast, input pixels (at half size: its own, twice as wide).

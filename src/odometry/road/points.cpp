@@ -15,7 +15,6 @@
 #include "odometry/road/region.hpp"
 
 namespace stemvo {
-
 namespace {
 
 constexpr int kMinPoints = 12;

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 namespace stemvo {
-
 namespace {
 constexpr double kMaxAngle_rad = 1.0;  ///< beyond it nobody knows how the turn goes on
 constexpr int kBorder_px = 4;
