@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -56,9 +57,8 @@ class EventLog {
                        : "the scale is doubted: lengths are a guess");
     }
     is_scale_believed_ = is_believed;
-    const bool was_contradicted =
-        std::exchange(is_contradicted_, result.road_reason == kRoadContradicted);
-    if (is_contradicted_ && !was_contradicted) {
+    if (std::exchange(road_reason_, result.road_reason) != kRoadContradicted &&
+        road_reason_ == kRoadContradicted) {
       tell(LogLevel::kWarning, result, "road and speeds contradict each other");
     }
   }
@@ -72,7 +72,7 @@ class EventLog {
   bool has_map_ = false;
   bool is_lost_ = false;
   bool is_scale_believed_ = false;
-  bool is_contradicted_ = false;
+  std::string_view road_reason_;
   std::string problem_;  ///< of the last frame
 };
 

@@ -130,9 +130,7 @@ std::optional<Rigid3> estimate_absolute_pose(std::span<const Eigen::Vector3d> po
   params.loMethod = cv::LOCAL_OPTIM_INNER_LO;
   cv::Mat intrinsics;
   cv::eigen2cv(camera.matrix(), intrinsics);
-  cv::Mat rotation;
-  cv::Mat translation;
-  cv::Mat inliers;
+  cv::Mat rotation, translation, inliers;
   try {
     if (!cv::solvePnPRansac(points, to_points(uv), intrinsics, cv::noArray(), rotation, translation,
                             inliers, params)) {

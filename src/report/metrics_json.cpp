@@ -263,10 +263,8 @@ std::string warn_of_scale(const MetricsReport& report) {
                    "speeds are followed (check scale.camera_height_m and the speeds' unit)",
                    100.0 * report.road_contradicted_fraction)
          : report.metric_fraction < kMostMetric
-             ? fmt::format(
-                   "scale: {:.1f} % of the frames only are in metres, as far as speeds "
-                   "reach; the others' lengths are units (scale_state in frames.csv)",
-                   100.0 * report.metric_fraction)
+             ? fmt::format("scale: {:.1f} % of the frames only are in metres (see frames.csv)",
+                           100.0 * report.metric_fraction)
              : "";
 }
 

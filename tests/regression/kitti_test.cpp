@@ -42,7 +42,10 @@ class RoadOfClip : public NeedsClips {
   static constexpr int kFrames = 80;
 
   /// The first frames of clip 03, seen by a camera that is mounted otherwise.
-  ProgramResult run(const std::function<void(cv::Mat&)>& turn, double cx_px, double cy_px) {
+  ProgramResult run(const std::function<void(cv::Mat&)>& turn,
+                    double cx_px,
+                    double cy_px,
+                    const Words& more = {}) {
     const fs::path clip = shared_data() / "kitti/sequences/03";
     const fs::path images = folder_ / "images";
     fs::create_directories(images);
@@ -60,7 +63,7 @@ class RoadOfClip : public NeedsClips {
         << "]\ndistortion_model: none\ndistortion_coefficients: []\nrate_hz: 10\n"
            "camera_height: 1.65\n";
     return run_stemvo(
-        {"run", images.parent_path().string(), "--out", folder_ / "result", "--quiet"});
+        {"run", images.parent_path().string(), "--out", folder_ / "result", "--quiet"}, more);
   }
   /// The path is in units.
   void expect_not_believed(const std::function<void(cv::Mat&)>& turn, double cx_px, double cy_px) {
@@ -80,6 +83,14 @@ constexpr int kHeight = 375;
 TEST_F(RoadOfClip, IsBelievedByTheCameraAsItIs) {
   const ProgramResult done = succeeded(run([](cv::Mat&) {}, kCx_px, kCy_px));
   EXPECT_THAT(done.err, Not(HasSubstr("warning: scale")));
+  EXPECT_GT(believed(), 0.85);
+}
+
+TEST_F(RoadOfClip, IsBelievedBeyondABonnetThatIsMasked) {
+  const auto paint = [](cv::Mat& image) {
+    cv::RNG(5).fill(image.rowRange(300, image.rows), cv::RNG::UNIFORM, 0, 255);
+  };
+  succeeded(run(paint, kCx_px, kCy_px, {"--mask", "0,300,1242,75"}));
   EXPECT_GT(believed(), 0.85);
 }
 

@@ -103,8 +103,7 @@ Channel road_channel(const cv::Mat& image, const Camera& camera) {
 bool shows_texture(const cv::Mat& image, const Camera& camera) {
   constexpr double kMinSpread = 2.0;  // gray levels; four of them, evenly used, have 1.1
   const int horizon = std::clamp(static_cast<int>(camera.cy_px), 0, image.rows - 1);
-  cv::Scalar mean;
-  cv::Scalar spread;
+  cv::Scalar mean, spread;
   cv::meanStdDev(image.rowRange(horizon, image.rows), mean, spread);
   return *std::ranges::max_element(spread.val) > kMinSpread;
 }
