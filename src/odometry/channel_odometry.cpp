@@ -31,7 +31,9 @@ ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera, c
       road_rows_(camera.height_px),
       aligns_images_(options.features.method == FeatureMethod::kPatch) {
   front_end_->set_mask(mask);
-  while (!mask.empty() && road_rows_ > 1 && mask.at<uchar>(road_rows_ - 1, mask.cols / 2) == 0) {
+  while (!mask.empty() && road_rows_ > 1 &&
+         cv::countNonZero(mask.row(road_rows_ - 1).colRange(mask.cols / 4, mask.cols / 4 * 3)) ==
+             0) {
     --road_rows_;
   }
   if (options.odometry.mode == OdometryMode::kTwoFrame) {
@@ -58,9 +60,9 @@ Frame ChannelOdometry::prepare(const Channel& channel,
   frame.pyramid = front_end_->prepare(seen, hints.mask);
   if (asks_road_) {
     const StageTimer timer(Stage::kRoadImage);
-    const cv::Mat below = image.rowRange(0, road_rows_);
+    const cv::Mat part = image.rowRange(0, road_rows_);
     const cv::Mat shown =
-        shows_texture(below, given_camera_) ? below : cv::Mat::zeros(below.size(), below.type());
+        shows_texture(part, given_camera_) ? part : cv::Mat::zeros(part.size(), part.type());
     const ChannelImage road = road_contrast_.apply(road_channel(shown, given_camera_));
     frame.road = std::make_shared<RoadImage>(make_road_image(road, given_camera_));
   }

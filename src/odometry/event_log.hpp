@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -49,8 +48,7 @@ class EventLog {
     }
   }
   void observe_scale(const FrameResult& result) {
-    const bool is_believed =
-        result.scale_state == ScaleState::kMeasured || result.scale_state == ScaleState::kHeld;
+    const bool is_believed = has_metres(result);
     if (is_believed != is_scale_believed_) {
       tell(is_believed ? LogLevel::kInfo : LogLevel::kWarning, result,
            is_believed ? "the scale is believed: lengths are metres"

@@ -22,6 +22,11 @@ namespace stemvo {
 /// FrameResult::road_reason where road and ways, both believed, contradict each other.
 inline constexpr std::string_view kRoadContradicted = "it contradicts the speed";
 
+/// The frame's lengths are metres, not units.
+[[nodiscard]] inline bool has_metres(const FrameResult& result) {
+  return result.scale_state == ScaleState::kMeasured || result.scale_state == ScaleState::kHeld;
+}
+
 /// Metres per unit of an estimator, from the road (`scale.source: camera_height`), from ways that
 /// somebody else measured, or from both; without either every factor is 1. And what each frame's
 /// result says of it.
@@ -114,7 +119,7 @@ class MetricScale {
   WayScale ways_;
   double way_from_road_ = 0.0;  ///< difference of what they say, mean of the last ways
   int num_compared_ = 0;
-  double apart_ = 0.0;        ///< contradiction() when the road was measured last
+  double apart_ = 0.0;        ///< contradiction() when both were measured last
   double last_time_s_ = 0.0;  ///< of the frame before
   bool has_ways_ = false;
   bool is_road_believed_ = false;

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "geometry/pose_influence.hpp"
+#include "odometry/metric_scale.hpp"
 #include "odometry/motion_model.hpp"
 #include "odometry/window.hpp"
 #include "stemvo/camera.hpp"
@@ -14,9 +15,7 @@ namespace stemvo {
 
 /// The scale's sigma where lengths are metres, nullopt where they are units.
 [[nodiscard]] inline std::optional<double> metric_sigma(const FrameResult& result) {
-  const bool is_metric = result.scale_state == ScaleState::kMeasured ||  //
-                         result.scale_state == ScaleState::kHeld;
-  return is_metric ? result.scale_sigma : std::nullopt;
+  return has_metres(result) ? result.scale_sigma : std::nullopt;
 }
 
 /// How sure the motion from frame to frame is (FrameResult::motion_covariance), measured on the

@@ -46,10 +46,6 @@ std::string describe_frames(const FrameSource& sequence, std::size_t num_frames)
   return one_line(fmt::format("frames {}:{} of {}", begin, end, sequence.name));
 }
 
-bool has_metres(const FrameResult& frame) {
-  return frame.scale_state == ScaleState::kMeasured || frame.scale_state == ScaleState::kHeld;
-}
-
 template <typename Predicate>
 double share_of(const std::vector<FrameResult>& frames, const Predicate& is_one) {
   return static_cast<double>(std::ranges::count_if(frames, is_one)) /

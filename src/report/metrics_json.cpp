@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kFewBelieved = 0.5;  ///< a smaller share is warned of
 constexpr double kFewContradicted = 0.05;
-constexpr double kMostMetric = 0.9;
+constexpr double kMostMetric = 0.9;  ///< where speeds are given, a smaller share is warned of
 constexpr double kFewTracked = 0.5;  ///< a smaller share of frames that were measured is, too
 constexpr double kInPlace = 0.95;    ///< a larger share of frames in place is told
 

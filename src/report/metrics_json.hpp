@@ -59,7 +59,7 @@ struct MetricsReport {
   /// Frames whose scale was in metres: `measured` or `held`; nullopt as above.
   std::optional<double> road_believed_fraction;
   double road_contradicted_fraction = 0.0;  ///< frames whose speed says another scale
-  double metric_fraction = 1.0;             ///< frames in metres, where speeds alone tell them
+  double metric_fraction = 1.0;             ///< frames in metres, where speeds are given
   std::optional<Metrics> metrics;
   std::optional<MapReport> map;        ///< nullopt: nothing is remembered
   std::optional<TimingReport> timing;  ///< nullopt: nobody asked, and the key is not in the file

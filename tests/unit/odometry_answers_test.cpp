@@ -137,12 +137,14 @@ TEST(EventLog, SaysWhatChangesAndOnlyThen) {
     lines.push_back((level == LogLevel::kWarning ? "warning " : "") + line);
   });
   double time_s = 0.0;
-  const auto see = [&](FrameState state, ScaleState scale, const char* problem = "") {
+  const auto see = [&](FrameState state, ScaleState scale, const char* problem = "",
+                       std::string_view road = "") {
     FrameResult result;
     result.state = state;
     result.time_s = time_s++;
     result.scale_state = scale;
     result.problem = problem;
+    result.road_reason = road;
     log.observe(result);
     return std::exchange(lines, {});
   };
@@ -161,6 +163,8 @@ TEST(EventLog, SaysWhatChangesAndOnlyThen) {
   EXPECT_THAT(see(kTracking, kNone), ElementsAre(HasSubstr("a new map was opened")));
   EXPECT_THAT(see(kNoImage, kNone, "too small"), ElementsAre("warning 11.000 s: too small"));
   EXPECT_THAT(see(kNoImage, kNone, "too small"), IsEmpty());
+  EXPECT_THAT(see(kTracking, kNone, "", kRoadContradicted), ElementsAre(HasSubstr("contradict")));
+  EXPECT_THAT(see(kTracking, kNone, "", kRoadContradicted), IsEmpty());
 }
 
 /// The poses where times begin at `first_s`, with a speed between frames.

@@ -59,6 +59,8 @@ class Actors:
 
 
 class _Worker:
+    """An actor of Ray; a process of our own begins by making one."""
+
     def __init__(self):
         _core.set_num_threads(1)
 
