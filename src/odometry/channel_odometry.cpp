@@ -28,14 +28,8 @@ ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera, c
       road_contrast_({.tracking_resolution = TrackingResolution::kNative}),
       front_end_(create_front_end(options.features)),
       image_turn_(camera),
-      road_rows_(camera.height_px),
       aligns_images_(options.features.method == FeatureMethod::kPatch) {
   front_end_->set_mask(mask);
-  while (!mask.empty() && road_rows_ > 1 &&
-         cv::countNonZero(mask.row(road_rows_ - 1).colRange(mask.cols / 4, mask.cols / 4 * 3)) ==
-             0) {
-    --road_rows_;
-  }
   if (options.odometry.mode == OdometryMode::kTwoFrame) {
     estimator_ = std::make_unique<PairEstimator>(options, camera);
   } else {
@@ -60,11 +54,11 @@ Frame ChannelOdometry::prepare(const Channel& channel,
   frame.pyramid = front_end_->prepare(seen, hints.mask);
   if (asks_road_) {
     const StageTimer timer(Stage::kRoadImage);
-    const cv::Mat part = image.rowRange(0, road_rows_);
     const cv::Mat shown =
-        shows_texture(part, given_camera_) ? part : cv::Mat::zeros(part.size(), part.type());
+        shows_texture(image, given_camera_) ? image : cv::Mat::zeros(image.size(), image.type());
     const ChannelImage road = road_contrast_.apply(road_channel(shown, given_camera_));
-    frame.road = std::make_shared<RoadImage>(make_road_image(road, given_camera_));
+    frame.road = std::make_shared<RoadImage>(
+        make_road_image(road, given_camera_, frame.pyramid->mask_of(road.map, road.pixels.size())));
   }
   return frame;
 }

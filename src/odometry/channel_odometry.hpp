@@ -84,7 +84,6 @@ class ChannelOdometry {
   [[nodiscard]] ImageClue clue_of(Frame& frame);
 
   ImageTurn image_turn_;
-  int road_rows_;       ///< down to a mask over the middle half of the bottom: a bonnet
   bool aligns_images_;  ///< for the front end that asks for turns
   double last_image_s_ = 0.0;
   RadialLens lens_;  ///< of the next frame to be tracked: what the one before it was localized by

@@ -120,6 +120,32 @@ TEST(RoadDense, AKerbAtTheSideCostsLittle) {
   EXPECT_NEAR(road.log_scale, 0.0, 0.025);
 }
 
+/// A low plane covers part of the strip, in either image or in both.
+TEST(RoadDense, WhatAMaskHidesIsLeftOut) {
+  const RoadPair road = render_pair(RoadScene{}, 0.8);
+  const RoadPair low = render_pair(RoadScene{.height_m = 0.9}, 0.8);
+  const auto off = [&](int width_px, bool covers_prev, bool covers_cur, bool is_masked) {
+    cv::Mat mask(road.cur.pixels.size(), CV_8U, cv::Scalar(255));
+    mask(cv::Rect(250, 170, width_px, mask.rows - 170)) = 0;
+    const auto image = [&](const RoadImage& plain, const RoadImage& covering, bool covers) {
+      cv::Mat pixels = plain.pixels.clone();
+      covering.pixels.copyTo(pixels, covers ? mask == 0 : mask != mask);
+      return make_road_image({pixels, {}}, RoadScene{}.camera,
+                             covers && is_masked ? mask : cv::Mat());
+    };
+    const RoadMeasurement found = measure_dense({image(road.prev, low.prev, covers_prev),
+                                                 image(road.cur, low.cur, covers_cur),
+                                                 road.cur_from_prev,
+                                                 {.log_scale = 0.3, .log_scale_sigma = 1.0},
+                                                 {}});
+    return found.is_valid ? std::abs(found.log_scale) : 1.0;
+  };
+  EXPECT_GT(off(150, true, true, false), 0.4);
+  EXPECT_LT(off(150, true, true, true), 0.008);
+  EXPECT_LT(off(150, false, true, true), 0.008);
+  EXPECT_LT(off(100, true, false, true), 0.005);
+}
+
 TEST(RoadDense, AnImageThatEndsAtTheHorizonShowsNoRoad) {
   const Rigid3 motion(Eigen::Quaterniond::Identity(), {0.0, 0.0, -0.8});
   const cv::Mat sky(130, 660, CV_8U, cv::Scalar(200));
@@ -163,9 +189,8 @@ TEST(RoadDense, ANarrowStripIsEnoughWhereTheScaleIsKnown) {
   const RoadPair pair = render_pair(RoadScene{}, 0.8);
   const RoadPrior prior = near(1.02);
   const RoadImage::Level& level = pair.cur.full;
-  const std::size_t num_pixels = RoadRegion(pair.cur_from_prev, prior, options)
-                                     .samples(level.camera, level.first_row, 1, 1)
-                                     .size();
+  const std::size_t num_pixels =
+      RoadRegion(pair.cur_from_prev, prior, options).samples(level, 1, 1).size();
   ASSERT_GT(num_pixels, 600U);
   ASSERT_LT(num_pixels, 2400U);
   const RoadMeasurement road =

@@ -18,6 +18,8 @@ class Processes:
         context = multiprocessing.get_context("spawn")
         self._pools = [concurrent.futures.ProcessPoolExecutor(1, context, _Worker) for _ in range(jobs)]
         self.workers = range(jobs)
+        for pool in self._pools:
+            pool.submit(int)  # it begins now
 
     def submit(self, worker, function, task):
         return self._pools[worker].submit(function, task)
@@ -30,7 +32,7 @@ class Processes:
 
     def close(self):
         for pool in self._pools:
-            pool.shutdown(cancel_futures=True)
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 class Actors:
@@ -74,7 +76,8 @@ def workers(jobs=None, address=None, ray=True):
     on_ray = ray and importlib.util.find_spec("ray") is not None
     if address and not on_ray:
         raise ValueError("--address: expected Ray to be installed, found none")
-    threading.Thread(target=importlib.import_module, args=["pandas"]).start()  # of the tables: a second, while workers start
+    # Of tables and figures: a second, while workers work.
+    threading.Thread(target=lambda: [importlib.import_module(name) for name in ("pandas", "stemvo.lab.figures")]).start()
     count = jobs if address else jobs or len(os.sched_getaffinity(0))
     with contextlib.closing(Actors(count, address) if on_ray else Processes(count)) as made:
         yield made

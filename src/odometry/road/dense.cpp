@@ -121,6 +121,9 @@ void for_each_match(const RoadImage::Level& prev,
     const Eigen::Array4f lower =
         Map(top + stride) + a * (Map(top + stride + 4) - Map(top + stride));
     const Eigen::Array4f value = upper + b * (lower - upper);
+    if (value[3] > 0.0F) {
+      continue;
+    }
     visit({sample, ray, inverse_flat, p, inverse_z, value,
            cur.values.ptr<float>(sample.v -
                                  cur.first_row)[4 * static_cast<std::ptrdiff_t>(sample.u)]});
@@ -289,7 +292,7 @@ RoadMeasurement measure_dense(const RoadStep& step) {
   const RoadRegion region(step.cur_from_prev, step.prior, step.options);
   const auto grid = [&](const RoadImage::Level& prev, const RoadImage::Level& cur, int step_u,
                         int step_v) {
-    return Grid{prev, cur, region.samples(cur.camera, cur.first_row, step_u, step_v)};
+    return Grid{prev, cur, region.samples(cur, step_u, step_v)};
   };
   std::vector<Grid> grids;
   RoadWarp warp(step.cur_from_prev, step.prior, step.options.camera_height_m);

@@ -28,8 +28,9 @@ Camera camera_in(const Camera& camera, const PixelMap& map, const cv::Size& size
           size.height};
 }
 
-/// Values and their gradient (central differences), pixel by pixel.
-cv::Mat with_gradient(const cv::Mat& values) {
+/// Values and their gradient (central differences), pixel by pixel; `hidden`: of their size, or
+/// empty.
+cv::Mat with_gradient(const cv::Mat& values, const cv::Mat& hidden) {
   cv::Mat result(values.size(), CV_32FC4);
   for (int v = 0; v < values.rows; ++v) {
     const auto* here = values.ptr<float>(v);
@@ -43,10 +44,16 @@ cv::Mat with_gradient(const cv::Mat& values) {
     const int last = values.cols - 1;
     out[last] = {here[last], 0.0F, 0.0F, 0.0F};
   }
+  if (!hidden.empty()) {
+    cv::insertChannel(hidden, result, 3);
+  }
   return result;
 }
 
-RoadImage::Level make_level(const cv::Mat& pixels, const Camera& camera, int contrast_px) {
+RoadImage::Level make_level(const cv::Mat& pixels,
+                            const cv::Mat& mask,
+                            const Camera& camera,
+                            int contrast_px) {
   RoadImage::Level level;
   level.camera = camera;
   level.first_row = std::clamp(static_cast<int>(camera.cy_px), 0, pixels.rows);
@@ -65,7 +72,12 @@ RoadImage::Level make_level(const cv::Mat& pixels, const Camera& camera, int con
   cv::sqrt(contrast, contrast);
   // Half a gray value: the noise of a plain surface is not blown up to the size of texture.
   values /= contrast + 0.5;
-  level.values = with_gradient(values);
+  cv::Mat hidden;
+  if (!mask.empty()) {  // and what the local contrast mixes with it
+    cv::Mat(mask.rowRange(level.first_row, mask.rows) == 0).convertTo(hidden, CV_32F, 1.0 / 255.0);
+    cv::dilate(hidden, hidden, cv::Mat::ones(window, CV_8U));
+  }
+  level.values = with_gradient(values, hidden);
   return level;
 }
 
@@ -108,11 +120,11 @@ bool shows_texture(const cv::Mat& image, const Camera& camera) {
   return *std::ranges::max_element(spread.val) > kMinSpread;
 }
 
-RoadImage make_road_image(const ChannelImage& image, const Camera& camera) {
-  RoadImage road{image.pixels, image.map, {}};
+RoadImage make_road_image(const ChannelImage& image, const Camera& camera, const cv::Mat& mask) {
+  RoadImage road{image.pixels, mask, image.map, {}};
   road.full.camera = camera_in(camera, image.map, image.pixels.size());
   if (std::min(image.pixels.rows, image.pixels.cols) >= 2) {
-    road.full = make_level(image.pixels, road.full.camera, contrast_reach(road));
+    road.full = make_level(image.pixels, mask, road.full.camera, contrast_reach(road));
   }
   return road;
 }
@@ -120,7 +132,12 @@ RoadImage make_road_image(const ChannelImage& image, const Camera& camera) {
 RoadImage::Level make_half_level(const RoadImage& road) {
   cv::Mat half;
   cv::resize(road.pixels, half, {}, 0.5, 0.5, cv::INTER_AREA);
-  return make_level(half, camera_in(road.full.camera, kHalf, half.size()), contrast_reach(road));
+  cv::Mat mask;
+  if (!road.mask.empty()) {
+    cv::resize(road.mask, mask, half.size(), 0.0, 0.0, cv::INTER_NEAREST);
+  }
+  return make_level(half, mask, camera_in(road.full.camera, kHalf, half.size()),
+                    contrast_reach(road));
 }
 
 RoadImage seen_by(const RoadImage& road, const Camera& camera) {

@@ -14,9 +14,13 @@ struct RoadImage {
   struct Level {
     Camera camera;  ///< in pixels of this level, whole image
     int first_row = 0;
-    cv::Mat values;  ///< CV_32FC4: value, d/du, d/dv, 0; row 0 is `first_row`
+    cv::Mat values;  ///< CV_32FC4: value, d/du, d/dv, 1 where hidden; row 0 is `first_row`
+    [[nodiscard]] bool hides(int u, int v) const {
+      return values.at<cv::Vec4f>(v - first_row, u)[3] > 0.0F;
+    }
   };
   cv::Mat pixels;  ///< CV_8U, the image itself
+  cv::Mat mask;    ///< CV_8U of its size, 0: hidden; empty: nothing is
   PixelMap map;    ///< to input pixels
   Level full;      ///< without values where too little is below the horizon
 };
@@ -30,7 +34,10 @@ struct RoadImage {
 /// road's texture.
 [[nodiscard]] bool shows_texture(const cv::Mat& image, const Camera& camera);
 
-[[nodiscard]] RoadImage make_road_image(const ChannelImage& image, const Camera& camera);
+/// `mask`: as RoadImage has it.
+[[nodiscard]] RoadImage make_road_image(const ChannelImage& image,
+                                        const Camera& camera,
+                                        const cv::Mat& mask = {});
 
 /// At half the size; without values as above.
 [[nodiscard]] RoadImage::Level make_half_level(const RoadImage& road);

@@ -50,8 +50,7 @@ Strip find_strip(const RoadImage& cur, const RoadRegion& region, const RoadOptio
   constexpr int kStep = 4;
   const cv::Rect image({}, cur.pixels.size());
   cv::Mat mask = cv::Mat::zeros(image.size(), CV_8U);
-  for (const RoadRegion::Sample& sample :
-       region.samples(cur.full.camera, cur.full.first_row, kStep, kStep)) {
+  for (const RoadRegion::Sample& sample : region.samples(cur.full, kStep, kStep)) {
     mask(cv::Rect(sample.u, sample.v, kStep, kStep) & image).setTo(255);
   }
   const cv::Rect seen = cv::boundingRect(mask);

@@ -60,17 +60,17 @@ Eigen::Vector2d RoadRegion::on_ground(const Eigen::Vector2d& xy) const {
           angle / std::abs(curvature_)};
 }
 
-std::vector<RoadRegion::Sample> RoadRegion::samples(const Camera& camera,
-                                                    int first_row,
+std::vector<RoadRegion::Sample> RoadRegion::samples(const RoadImage::Level& level,
                                                     int step_u,
                                                     int step_v) const {
   std::vector<Sample> result;
+  const Camera& camera = level.camera;
   const int last_row = camera.height_px - kBorder_px;
   const double far_row = camera.cy_px + camera.fy_px * (1.0 / far_m_ - plane_.z()) / plane_.y();
   if (!(far_row > -1e6 && far_row < last_row)) {
     return result;
   }
-  const int row0 = std::max(first_row + kBorder_px, static_cast<int>(far_row));
+  const int row0 = std::max(level.first_row + kBorder_px, static_cast<int>(far_row));
   const int tile_rows = kTiles / kTileColumns;
   for (int v = row0; v < last_row; v += step_v) {
     const int tile_row = tile_rows * (v - row0) / std::max(1, last_row - row0);
@@ -87,7 +87,7 @@ std::vector<RoadRegion::Sample> RoadRegion::samples(const Camera& camera,
     last = std::min(camera.width_px - kBorder_px, last + kCoarse * step_u);
     for (int u = first; u < last; u += step_u) {
       const Eigen::Vector2d ground = ground_at(u);
-      if (!contains(ground)) {
+      if (!contains(ground) || level.hides(u, v)) {
         continue;
       }
       const double across = (ground.x() + half_width_m_) / (2.0 * half_width_m_);

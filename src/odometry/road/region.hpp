@@ -22,10 +22,9 @@ class RoadRegion {
     int v = 0;
     int tile = 0;
   };
-  /// Every `step_u`-th pixel of every `step_v`-th row of the strip, at rows >= first_row; tiles are
+  /// Every `step_u`-th pixel of every `step_v`-th row of the strip that is not hidden; tiles are
   /// cells of the strip.
-  [[nodiscard]] std::vector<Sample> samples(const Camera& camera,
-                                            int first_row,
+  [[nodiscard]] std::vector<Sample> samples(const RoadImage::Level& level,
                                             int step_u,
                                             int step_v) const;
   static constexpr int kTiles = 48;
