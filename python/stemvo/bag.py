@@ -158,6 +158,8 @@ def convert(options, folder):
                 last_ns, written = time_ns, written + 1
     if written == 0:
         raise BagError(f"{topic}: expected at least one image, found none")
+    if left_out > written:
+        raise BagError(f"{topic}: expected stamps that rise, found {left_out} of {left_out + written} images of no later time than the one before")
     return written, left_out
 
 

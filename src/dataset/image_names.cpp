@@ -30,26 +30,31 @@ bool is_digit(char c) { return kDigitCharacters.find(c) != std::string_view::npo
 /// are its decimals.
 std::string sort_key(std::string_view name, bool has_decimals) {
   std::string key;
-  bool are_decimals = false;
-  while (!name.empty()) {
+  const auto take_digits = [&name] {
     const std::size_t length = std::min(name.find_first_not_of(kDigitCharacters), name.size());
-    if (length == 0) {
-      are_decimals = has_decimals && name.front() == '.' && !key.empty() && is_digit(key.back());
+    const std::string_view digits = name.substr(0, length);
+    name.remove_prefix(length);
+    return digits;
+  };
+  while (!name.empty()) {
+    if (!is_digit(name.front())) {
       key += name.front();
       name.remove_prefix(1);
       continue;
     }
-    std::string_view number = name.substr(0, length);
-    if (are_decimals) {
-      key += std::string(number) + '\0';
-    } else {
-      number.remove_prefix(std::min(number.find_first_not_of('0'), length));
-      key += '0';
-      key += static_cast<char>(number.size());  // names have at most 255 characters
-      key += number;
+    std::string_view number = take_digits();
+    number.remove_prefix(std::min(number.find_first_not_of('0'), number.size()));
+    key += '0';
+    key += static_cast<char>(number.size());  // names have at most 255 characters
+    key += number;
+    if (has_decimals) {
+      key += '.';
+      if (name.size() > 1 && name.front() == '.' && is_digit(name[1])) {
+        name.remove_prefix(1);
+        key += take_digits();
+      }
+      key += '\0';
     }
-    are_decimals = false;
-    name.remove_prefix(length);
   }
   return key;
 }
@@ -137,10 +142,11 @@ bool are_seconds(const std::string& before, const std::set<std::string>& numbers
          std::regex_match(before, kMinute);
 }
 
+constexpr std::size_t kMostCameras = 6;
+
 /// Numbers alone ("_0", "_1") are cameras' where a few follow each other, many times: else they may
 /// be seconds.
 bool may_be_cameras(const std::set<std::string>& names, std::size_t num_moments) {
-  constexpr std::size_t kMost = 6;
   constexpr std::size_t kMany = 5;
   std::set<double> numbers;
   for (const std::string& name : names) {
@@ -149,12 +155,12 @@ bool may_be_cameras(const std::set<std::string>& names, std::size_t num_moments)
     }
     numbers.insert(std::strtod(name.c_str() + std::min<std::size_t>(name.size(), 1), nullptr));
   }
-  return names.size() > 1 && names.size() <= kMost && num_moments >= kMany &&
+  return names.size() > 1 && names.size() <= kMostCameras && num_moments >= kMany &&
          *numbers.rbegin() - *numbers.begin() + 1.0 == static_cast<double>(names.size());
 }
 
-/// Error: frames of several cameras in pairs ("7_cam0", "7_cam1"), or an image beside its copy
-/// ("7 (1).png").
+/// Error: frames of several cameras in pairs ("7_cam0", "7_cam1") or in turns ("7_cam0", "8_cam1"),
+/// or an image beside its copy ("7 (1).png").
 Status check_names(const std::vector<fs::path>& files, const fs::path& given) {
   static const std::regex kCopy("(.+?)( \\([0-9]+\\)|[ _-]+[Cc]opy.*)");
   static const std::regex kCamera(
@@ -162,12 +168,16 @@ Status check_names(const std::vector<fs::path>& files, const fs::path& given) {
   std::set<std::string> stems;
   std::set<std::string> moments;
   std::set<std::string> cameras;
+  std::string last;
+  std::size_t num_turns = 0;
   for (const fs::path& file : files) {
     const std::string stem = file.stem().string();
     std::smatch part;
     const bool has_camera = std::regex_match(stem, part, kCamera);
     moments.insert(has_camera ? part[1].str() : stem);
-    cameras.insert(has_camera ? part[2].str() : "");
+    const std::string camera = has_camera ? part[2].str() : "";
+    num_turns += std::exchange(last, camera) == camera ? 0U : 1U;
+    cameras.insert(camera);
     stems.insert(stem);
   }
   const auto fail_of = [&](const fs::path& file, const std::string& frames) {
@@ -178,8 +188,12 @@ Status check_names(const std::vector<fs::path>& files, const fs::path& given) {
   };
   constexpr double kMost = 0.9;  // some frames may be missing
   const auto num_pairs = static_cast<double>(moments.size() * cameras.size());
+  const auto num_files = static_cast<double>(files.size());
+  const bool take_turns = cameras.size() <= kMostCameras && files.size() >= 3 * cameras.size() &&
+                          moments.size() == files.size() &&
+                          static_cast<double>(num_turns) > kMost * num_files;
   if (may_be_cameras(cameras, moments.size()) && moments.size() > cameras.size() &&
-      static_cast<double>(files.size()) > kMost * num_pairs) {
+      (num_files > kMost * num_pairs || take_turns)) {
     return fail_of(files[1], *cameras.begin());
   }
   for (const fs::path& file : files) {
@@ -192,9 +206,17 @@ Status check_names(const std::vector<fs::path>& files, const fs::path& given) {
   return {};
 }
 
-std::string letters_of(std::string name) {
-  std::erase_if(name, [](unsigned char c) { return std::isdigit(c) != 0; });
-  return name;
+/// Two beginnings of names may be of two cameras: their letters differ ("left_", "right_"), or one
+/// digit behind letters ("cam0_", "cam1_"), and not the digits of a date or an hour.
+bool tell_cameras(const NameParts& a, const NameParts& b) {
+  static const std::regex kNumbered("[^0-9]*[A-Za-z][^0-9]*[0-9][^0-9]*");
+  const auto letters_of = [](const NameParts& parts) {
+    std::string name = parts.before + parts.behind;
+    std::erase_if(name, [](unsigned char c) { return std::isdigit(c) != 0; });
+    return name;
+  };
+  return letters_of(a) != letters_of(b) ||
+         (std::regex_match(a.before, kNumbered) && std::regex_match(b.before, kNumbered));
 }
 
 /// About as many of each, over much of the same span.
@@ -242,9 +264,7 @@ Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) 
   }
   // Cameras whose numbers are their own, but of one time.
   for (auto b = groups.begin(), a = b; b != groups.end(); a = b++) {
-    if (a != b &&
-        letters_of(a->first.first + a->first.second) !=
-            letters_of(b->first.first + b->first.second) &&
+    if (a != b && tell_cameras(parts_of(a->second.first), parts_of(b->second.first)) &&
         are_of_one_time(a->second.numbers, b->second.numbers)) {
       return one_time(given, a->second.first, b->second.first);
     }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -146,10 +147,12 @@ double VideoStream::next_time_s() {
   constexpr double kMinTime_s = -1e6;  // FFmpeg's number for no time is far below
   const double told_s = kMillisecond_s * decoder_.position_ms();
   if (told_s > last_time_s_.value_or(kMinTime_s) && std::isfinite(told_s)) {
+    num_counted_ += std::exchange(num_untold_, 0U);
+    told_step_s_ = last_time_s_ ? std::optional(told_s - *last_time_s_) : std::nullopt;
     return told_s;
   }
-  ++num_counted_;
-  return last_time_s_ ? *last_time_s_ + 1.0 / counted_hz() : 0.0;
+  ++(told_step_s_ ? num_untold_ : num_counted_);
+  return last_time_s_ ? *last_time_s_ + told_step_s_.value_or(1.0 / counted_hz()) : 0.0;
 }
 
 bool VideoStream::grab() {
@@ -211,7 +214,8 @@ double VideoStream::time_s(std::size_t index) const {
 
 std::size_t VideoStream::num_counted() const {
   const std::lock_guard lock(mutex_);
-  return num_counted_;
+  constexpr std::size_t kMostKept = 16;  // frames that H.264 and H.265 put into order
+  return num_counted_ + (num_untold_ > kMostKept ? num_untold_ : 0U);
 }
 
 std::string warn_of_turn(const VideoStream& stream, const std::string& owner) {

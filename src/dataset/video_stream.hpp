@@ -68,6 +68,10 @@ class VideoStream {
   bool is_grabbed_ = false;  ///< it waits to be read
   bool is_ended_ = false;
   std::size_t num_counted_ = 0;
+  /// Frames since one that had a time: the last ones of a video, which FFmpeg keeps back to put
+  /// them into order, have none.
+  std::size_t num_untold_ = 0;
+  std::optional<double> told_step_s_;  ///< between the last two that had
   std::optional<double> last_time_s_;  ///< of the frame grabbed last
   std::deque<double> times_s_;
 };

@@ -34,8 +34,10 @@ std::string with_blanks(std::string_view line) {
 bool is_blank(std::string_view line) { return take_word(line).empty(); }
 
 /// The format of a first row whose numbers stand between commas. Nullopt: two formats' rows look
-/// so.
-std::optional<Format> format_of_commas(std::string_view row, bool says_nanoseconds) {
+/// so, or none has its quaternion as a comment says.
+std::optional<Format> format_of_commas(std::string_view row,
+                                       bool says_nanoseconds,
+                                       bool says_w_first) {
   constexpr double kNanoseconds = 1e12;  // as seconds, 30,000 years
   const std::vector<std::string_view> words = split_words(row);
   if (words.size() == 12) {
@@ -44,7 +46,8 @@ std::optional<Format> format_of_commas(std::string_view row, bool says_nanosecon
   const auto time = parse_numbers(words.empty() ? "" : words.front(), 1);
   const bool is_long = time && time->front() > kNanoseconds;
   if (words.size() == 8 && !says_nanoseconds) {
-    return is_long ? std::nullopt : std::optional(Format::kTum);
+    return is_long == says_w_first ? std::optional(is_long ? Format::kEuroc : Format::kTum)
+                                   : std::nullopt;
   }
   return Format::kEuroc;
 }
@@ -73,15 +76,15 @@ std::optional<Format> format_of(std::string_view text) {
     says_nanoseconds =
         says_nanoseconds || (is_comment && line.find("[ns]") != std::string_view::npos);
     says_w_first = says_w_first || (is_comment && names_w_first(line));
-    if (!first.empty() && !is_comment && says_w_first && !says_nanoseconds) {
-      return std::nullopt;
-    }
     if (!first.empty() && !is_comment) {
       const std::string_view row = line.substr(0, line.find('#'));
-      return row.find(',') != std::string_view::npos
-                 ? format_of_commas(with_blanks(row), says_nanoseconds)
-             : has_comment || split_words(row).size() == 8 ? Format::kTum
-                                                           : Format::kKitti;
+      if (row.find(',') != std::string_view::npos) {
+        return format_of_commas(with_blanks(row), says_nanoseconds, says_w_first);
+      }
+      if (says_w_first && !says_nanoseconds) {
+        return std::nullopt;
+      }
+      return has_comment || split_words(row).size() == 8 ? Format::kTum : Format::kKitti;
     }
   }
   return has_comment ? Format::kTum : Format::kKitti;

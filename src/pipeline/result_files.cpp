@@ -138,14 +138,19 @@ class ResultWriter {
   }
 
  private:
-  /// From where the camera starts: images that cannot be read before it have no pose to compare.
-  /// Nullopt: no motion is left.
+  /// From where the camera starts: images before it that cannot be read, or show nothing (a lens
+  /// cap), have no pose to compare. Nullopt: no motion is left.
   [[nodiscard]] std::optional<GroundTruth> seen_part(const GroundTruth& truth) const {
-    const auto first_seen = std::ranges::find_if(drive_.frames, [](const FrameResult& frame) {
-      return frame.state != FrameState::kNoImage;
+    const auto& frames = drive_.frames;
+    const auto seen = std::ranges::find_if(
+        frames, [](const auto& frame) { return frame.state != FrameState::kNoImage; });
+    const auto located = std::find_if(seen, frames.end(), [](const auto& frame) {
+      return frame.state != FrameState::kNoImage && frame.state != FrameState::kFirst &&
+             frame.state != FrameState::kLost;
     });
-    const auto first = std::ranges::lower_bound(
-        truth.frames, static_cast<std::size_t>(first_seen - drive_.frames.begin()));
+    const auto start = located == frames.end() || located == seen ? seen : located - 1;
+    const auto first =
+        std::ranges::lower_bound(truth.frames, static_cast<std::size_t>(start - frames.begin()));
     const auto skipped = static_cast<std::size_t>(first - truth.frames.begin());
     if (truth.frames.size() < skipped + 2) {
       return std::nullopt;

@@ -224,14 +224,19 @@ Expected<Unit> find_unit(const std::vector<TimedRow>& rows, const UsualTimes& us
     return !usual.span_s ||
            usual.span_s->second - usual.span_s->first <= kMaxRatio * (last - first) * unit.size_s;
   };
+  const auto is_since_1970 = [&](const Unit& unit) {
+    return first * unit.size_s >= 1e9 && last * unit.size_s <= 4e9;
+  };
   for (const Unit& unit : kUnits) {
-    if (is_short(unit) && first * unit.size_s >= 1e9 && last * unit.size_s <= 4e9) {
-      return unit;  // since 1970
+    if (is_short(unit) && is_since_1970(unit)) {
+      return unit;
     }
   }
   if (is_short(kUnits[0])) {
     return kUnits[0];
   }
+  constexpr double kRare_s = 600.0;  // rows since 1970 may be so far apart
+  const bool may_be_rare = step <= kRare_s && is_since_1970(kUnits[0]);
   std::vector<Unit> usual_units;
   std::optional<Unit> of_span;
   for (const Unit& unit : kUnits) {
@@ -240,7 +245,8 @@ Expected<Unit> find_unit(const std::vector<TimedRow>& rows, const UsualTimes& us
         is_of_span(first * unit.size_s, last * unit.size_s, *usual.span_s)) {
       of_span = unit;
     }
-    if (is_long && is_short(unit) && covers_frames(unit)) {
+    const bool is_usual = is_short(unit) || (unit.size_s == 1.0 && may_be_rare);
+    if (is_long && is_usual && covers_frames(unit)) {
       usual_units.push_back(unit);
     }
   }

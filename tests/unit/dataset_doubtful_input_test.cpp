@@ -179,6 +179,10 @@ TEST_F(DoubtfulInput, PairsOfCamerasBehindTheNumberCopiesAndAMaskAreNoFrames) {
            {"01_0.png", "01_1.png", "02_0.png", "02_1.png", "03_0.png", "03_1.png", "04_0.png",
             "04_1.png", "05_0.png", "05_1.png"},
            {"1-c0.png", "1-c1.png", "2-c0.png", "2-c1.png", "3-c0.png", "3-c1.png"},
+           {"cam0_170.png", "cam0_270.png", "cam0_370.png", "cam1_171.png", "cam1_271.png",
+            "cam1_371.png"},
+           {"170_cam0.png", "171_cam1.png", "270_cam0.png", "271_cam1.png", "370_cam0.png",
+            "371_cam1.png"},
            {"00001_left.png", "00004_right.png", "00051_left.png", "00054_right.png",
             "00101_left.png", "00104_right.png"},
            {"a_5.100.png", "b_5.103.png", "a_5.200.png", "b_5.203.png", "a_5.300.png",
@@ -191,6 +195,9 @@ TEST_F(DoubtfulInput, PairsOfCamerasBehindTheNumberCopiesAndAMaskAreNoFrames) {
            {"1.1.png", "1.9.png", "1.10.png", "1.11.png"},
            {"1700000001_033333333.png", "1700000001_066666666.png", "1700000002_000000000.png",
             "1700000002_033333333.png"},
+           {"0.1.png", "0.1333.png", "0.1667.png", "0.2.png", "1.png", "1.0333.png"},
+           {"part1_1.png", "part1_2.png", "part1_3.png", "part2_4.png", "part2_5.png",
+            "part2_6.png"},
            {"cam0_frame1.png", "cam0_frame2.png", "cam0_frame3.png"},
            {"img (1).png", "img (2).png", "img (3).png"},
            {"12h30m08s1.png", "12h30m08s2.png", "12h30m09s1.png", "12h30m09s2.png",
@@ -250,6 +257,8 @@ TEST_F(DoubtfulInput, TimesInOtherUnits) {
 
 TEST_F(DoubtfulInput, TimesOfFastCamerasAndOfEurocsLayout) {
   FrameSourceRequest request = write_images({"1.png", "2.png", "3.png"});
+  request.times = temp_.file("times.txt", "1317000000\n1317000005\n1317000010\n");
+  EXPECT_THAT(error_of(request), HasSubstr("found steps of 5, seconds or milliseconds"));
   const auto open = [&](const std::string& first, const std::string& rest) {
     request.times = temp_.file("times.txt", first + "0000\n" + first + rest);
     return open_source(request);
@@ -330,6 +339,9 @@ TEST_F(DoubtfulVideo, FramesWithoutTimesAreCounted) {
   const double none = -7.7e15;  // FFmpeg's least number in ms
   EXPECT_THAT(times_of({none, none, none}), ElementsAre(0.0, 0.1, 0.2, 3.0)) << "camera file's";
   EXPECT_THAT(times_of({5000, 5250, 5500}), ElementsAre(5.0, 5.25, 5.5, 0.0)) << "late, no shift";
+  EXPECT_THAT(times_of({5000, 5250, 5500, none, 5500}), ElementsAre(5.0, 5.25, 5.5, 5.75, 6.0, 0.0))
+      << "kept back until the end";
+  EXPECT_THAT(times_of({5000, 5250, none, 5750}), ElementsAre(5.0, 5.25, 5.5, 5.75, 1.0));
 }
 
 TEST_F(DoubtfulVideo, ATurnIsSaid) {

@@ -56,7 +56,7 @@ class Recordings : public ::testing::Test {
       list += fmt::format("{},{}\r\n", kFirst_ns + i * kFrame_ns, name);
       cv::imwrite((mav / "cam0/data" / name).string(), frame(i));
     }
-    std::string truth = "#timestamp, p_RS_R_x [m], ..\n";
+    std::string truth = "#timestamp, p_RS_R_x [m], q_RS_w [], q_RS_x [], ..\n";
     for (int k = 10; k <= 40; ++k) {  // the body moves along its x by 1 m per frame
       truth += fmt::format("{},{},0,0,1,0,0,0,0,0,0,0,0,0,0,0,0\n",
                            kFirst_ns + k * kFrame_ns / 10 + 1000000, 0.1 * k);

@@ -218,7 +218,11 @@ TEST(PoseFile, NumbersBetweenCommasAndNamesInComments) {
                 HasSubstr("qw before qx in a comment"));
   }
   EXPECT_TRUE(read("# w.r.t. the first camera: t x y z qx qy qz qw\n1.5 5 6 7 0 0 0 1\n"));
-  EXPECT_TRUE(read("#t [ns]\n1700000000500000000,5,6,7,1,0,0,0\n")->is_of_body);
+  for (const char* row : {"#t [ns]\n1700000000500000000,5,6,7,1,0,0,0\n",
+                          "#t, q_RS_w [], q_RS_x []\n1700000000500000000,5,6,7,1,0,0,0\n",
+                          "#t, q_RS_w [], q_RS_x []\n1700000000500000000,5,6,7,1,0,0,0,9\n"}) {
+    EXPECT_TRUE(read(row)->is_of_body);
+  }
   EXPECT_THAT(message_of(read("0,5,6,7,1,0,0,0\n50000000,5,6,7,1,0,0,0\n")),
               AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's"), HasSubstr("steps of 5e+07")));
   EXPECT_THAT(message_of(read("1.25,5,6,7,1,0,0,0,9\n1.75,5,6,7,1,0,0,0,9\n")),
