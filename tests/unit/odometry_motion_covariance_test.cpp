@@ -109,6 +109,23 @@ TEST(MotionCovariance, IsFiniteAndPositiveDefiniteInEveryState) {
   }
 }
 
+/// Else a pose that steps lead to would be unsure by the first one for good.
+TEST(MotionCovariance, TheStepThatOpensAMapIsAsSureAsTheMap) {
+  const DriveTracks drive(20, 0.2, 5);
+  WindowEstimator estimator(config_without_scale(), drive.camera);
+  EstimatorRun run(estimator, drive);
+  run.add_all();
+  ASSERT_EQ(run.results[1].state, FrameState::kInitializing);
+  ASSERT_EQ(run.results[2].state, FrameState::kTracking);
+  Rigid3 motion = motion_to(drive.world_from_camera, 1);
+  motion.translation *= length_ratio(estimator.trajectory(), drive.world_from_camera, 2, 19);
+  const double length = motion.translation.norm();
+  EXPECT_LT(sigma_of_length(run.results[1]), 0.2 * length);
+  EXPECT_LT(
+      squared_error(motion_to(estimator.trajectory(), 1), motion, run.results[1].motion_covariance),
+      12.592);
+}
+
 TEST(MotionCovariance, IsZeroUntilAFrameIsSeen) {
   const DriveTracks drive(30, 0.2, 5);
   WindowEstimator window(config_without_scale(), drive.camera);
