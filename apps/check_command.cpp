@@ -9,7 +9,6 @@
 #include "commands.hpp"
 #include "console.hpp"
 #include "options.hpp"
-#include "pipeline/out_folder.hpp"
 #include "report/check.hpp"
 #include "report/metrics_json.hpp"
 #include "text/text_file.hpp"
@@ -51,12 +50,14 @@ nlohmann::ordered_json document(const std::vector<ThresholdResult>& results) {
 Expected<int> check(CheckArguments& arguments) {
   const CheckRequest& request = arguments.request;
   if (arguments.junit) {
-    STEMVO_TRY(pipeline::check_is_no_input(
-        *arguments.junit,
-        {request.metrics, request.thresholds.value_or(""), request.baseline.value_or("")}));
     STEMVO_TRY(check_can_write(*arguments.junit));
   }
-  STEMVO_TRY_GET(const std::vector<ThresholdResult> results, check_metrics(request));
+  const auto checked = check_metrics(request);
+  if (!checked && arguments.junit) {
+    const ThresholdResult unread{.key = "metrics", .problem = checked.error().message};
+    STEMVO_TRY(write_text_file(*arguments.junit, format_junit({unread}, request.metrics.string())));
+  }
+  STEMVO_TRY_GET(const std::vector<ThresholdResult> results, checked);
   print(format_check_table(results));
   print_json(document(results));
   if (arguments.junit) {

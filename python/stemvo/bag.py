@@ -189,6 +189,8 @@ def main(arguments=None):
         if options.out.exists():
             raise BagError(f"{options.out}: expected a name that does not exist, found one")
         if result_bag.is_result(options.bag):
+            if options.out.suffix != ".mcap":
+                raise BagError(f"{options.out}: expected a name that ends with .mcap, the only kind a result becomes")
             written = result_bag.write_result(options.bag, options.out, opener(options))
             print(f"{options.out}: {written} frames")
             return 0
@@ -197,7 +199,8 @@ def main(arguments=None):
         unfinished.rename(options.out)
     except Exception as error:  # rosbags throws whatever a damaged file leads to
         shutil.rmtree(unfinished, ignore_errors=True)
-        print(f"error: {options.bag}: {' '.join(str(error).split()) or type(error).__name__}", file=sys.stderr)
+        text = " ".join(str(error).replace("camera_file", "--camera").split())
+        print(f"error: {options.bag}: {text or type(error).__name__}", file=sys.stderr)
         return 1
     print(f"{options.out}: {written} images" + (f"; {left_out} of no later time than the one before are left out" if left_out else ""))
     return 0

@@ -195,8 +195,8 @@ Expected<BoardFit> fit_camera(std::vector<BoardView>& views, const cv::Size& siz
   std::ranges::transform(views, std::back_inserter(used), [](BoardView& view) { return &view; });
   if (used.size() < kMinViews) {
     return fail(
-        fmt::format("expected at least {} pictures with the board, found {}; --board "
-                    "counts a chessboard's inner corners",
+        fmt::format("expected at least {} pictures with the board, found {}; is it as "
+                    "--board says (a chessboard's inner corners, a ChArUco's dictionary)?",
                     kMinViews, used.size()));
   }
   constexpr double kMinSigmas = 3.0;

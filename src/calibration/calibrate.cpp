@@ -40,14 +40,6 @@ fs::path calibration_file(const CalibrationRequest& request, const FrameSource& 
   return sequence.given_calibration.value_or(request.sequence_dir / "calib.txt");
 }
 
-Status check_request(const CalibrationRequest& request, const FrameSource& sequence) {
-  std::vector<fs::path> inputs = pipeline::input_files(request, sequence, request.config);
-  inputs.insert(inputs.end(), {calibration_file(request, sequence), request.config.file,
-                               request.sequence_dir / "times.txt"});
-  STEMVO_TRY(pipeline::check_is_no_input(request.out_file, inputs));
-  return check_can_write(request.out_file);
-}
-
 Expected<KeptMap> drive(const CalibrationRequest& request,
                         const FrameSource& sequence,
                         const RunProgress& progress,
@@ -183,7 +175,7 @@ Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request
   FrameSourceRequest source = request;
   source.SequenceOptions::camera = request.config.input.camera;
   STEMVO_TRY_GET(const FrameSource sequence, open_source(source));
-  STEMVO_TRY(check_request(request, sequence));
+  STEMVO_TRY(check_can_write(request.out_file));
   CalibrationReport report;
   report.is_kitti = sequence.is_kitti;
   Expected<KeptMap> map = drive(request, sequence, progress, report);

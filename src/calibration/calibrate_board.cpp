@@ -79,7 +79,6 @@ Expected<cv::Size> look_at_images(const BoardRequest& request,
                  dataset::list_images(is_folder(inside) ? inside : request.pictures));
   FrameSource frames;
   frames.files = listing.files;
-  STEMVO_TRY(pipeline::check_is_no_input(request.out_file, frames.files));
   STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames));
   report.warnings = frames.warnings;
   add_line(report.warnings, listing.warning);
@@ -99,7 +98,6 @@ Expected<cv::Size> look_at_images(const BoardRequest& request,
 Expected<cv::Size> look_at_video(const BoardRequest& request,
                                  const RunProgress& progress,
                                  BoardReport& report) {
-  STEMVO_TRY(pipeline::check_is_no_input(request.out_file, {request.pictures}));
   STEMVO_TRY_GET(const auto stream, dataset::VideoStream::open(request.pictures, {}));
   add_line(report.warnings, dataset::warn_of_turn(*stream, request.pictures.string()));
   constexpr std::size_t kMaxLooks = 300;

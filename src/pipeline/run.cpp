@@ -136,17 +136,18 @@ Expected<RunSummary> run_source(RunRequest request,
   pipeline::DriveVideo video;
   const Run run{request, sequence, odometry, beside, video};
   const bool is_replacing = pipeline::is_folder_of(request.out_dir, "run");
-  auto inputs = pipeline::input_files(request, sequence, request.config);
-  inputs.insert(inputs.end(),
-                {request.speeds.value_or(""), request.gyro.value_or(""), request.map.value_or("")});
-  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(request.out_dir, "run", inputs));
+  STEMVO_TRY(pipeline::open_out_folder(request.out_dir, "run"));
   // Before anything is removed: a wrong name costs no earlier result.
   if (request.saved_map) {
     STEMVO_TRY(check_place_of_map(*request.saved_map));
     STEMVO_TRY(check_can_write(*request.saved_map));
   }
   if (request.video) {
-    STEMVO_TRY(pipeline::check_is_no_input(*request.video, inputs));
+    if (std::error_code code;
+        std::filesystem::equivalent(*request.video, request.sequence_dir, code)) {
+      return fail(fmt::format("--video {}: expected a file to write, found the recording",
+                              request.video->string()));
+    }
     STEMVO_TRY_GET(video, pipeline::DriveVideo::create(request, sequence));
   }
   STEMVO_TRY(prepare_out_folder(run));
@@ -181,9 +182,7 @@ Expected<ChannelImagesReport> write_channel_images(const ChannelImagesRequest& r
       const FrameRange filters,
       dataset::resolve_range(request.filters, static_cast<std::size_t>(stem.info().num_filters),
                              stem.info().model, "filters"));
-  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(
-                                      request.out_dir, "channel",
-                                      pipeline::input_files(request, sequence, request.config)));
+  STEMVO_TRY(pipeline::open_out_folder(request.out_dir, "channel"));
   std::size_t num_written = 0;
   const auto save = [&](const cv::Mat& image, std::size_t number, const std::string& name) {
     ++num_written;

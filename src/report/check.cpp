@@ -122,8 +122,10 @@ Expected<std::vector<ThresholdResult>> read_baseline(const std::filesystem::path
     if (baseline.contains(same) && metrics.contains(same) && baseline[same] != metrics[same]) {
       bounds.push_back({.key = same,
                         .place = place,
-                        .problem = fmt::format("{}{}: expected {} as in the run, found {}", place,
-                                               same, metrics[same].dump(), baseline[same].dump())});
+                        .problem = fmt::format("{}{}: expected {}{} as in the run, found {}", place,
+                                               same, metrics[same].dump(),
+                                               metrics[same].is_null() ? " (no ground truth)" : "",
+                                               baseline[same].dump())});
     }
   }
   return bounds;

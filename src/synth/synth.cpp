@@ -58,18 +58,14 @@ struct DriveFolder {  // OUT/sequences/NAME and OUT/poses/NAME.txt
 };
 
 /// Makes the folders, empty. Error: what is there was not rendered.
-Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
-                                           const SyntheticDriveOptions& options) {
-  if (options.trajectory) {
-    STEMVO_TRY(pipeline::check_is_no_input(drive.poses, {*options.trajectory}));
-  }
+Status open_folder(const DriveFolder& drive, const SyntheticDriveOptions& options) {
   std::error_code code;
   if (is_there(drive.poses) && !pipeline::is_folder_of(drive.sequence, "synth")) {
     return fail(fmt::format(
         "{}: expected poses of a rendered drive or none, found others (--name gives another name)",
         drive.poses.string()));
   }
-  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(drive.sequence, "synth", {}));
+  STEMVO_TRY(pipeline::open_out_folder(drive.sequence, "synth"));
   for (const char* content : {"image_2", "depth", "moving", "times.txt"}) {
     fs::remove_all(drive.sequence / content, code);
   }
@@ -80,8 +76,7 @@ Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
   if (options.render.traffic) {
     fs::create_directory(drive.sequence / "moving", code);
   }
-  STEMVO_TRY(pipeline::create_out_folder(drive.poses.parent_path()));
-  return lock;
+  return pipeline::create_out_folder(drive.poses.parent_path());
 }
 
 /// NumPy format 1.0, little-endian float32, rows first.
@@ -150,7 +145,7 @@ Status render_synthetic_drive(const fs::path& out_dir,
   STEMVO_TRY_GET(auto path, plan_path(options));
   const DriveFolder drive{out_dir / "sequences" / options.name,
                           out_dir / "poses" / (options.name + ".txt")};
-  STEMVO_TRY_GET(const auto lock, open_folder(drive, options));
+  STEMVO_TRY(open_folder(drive, options));
   const Camera camera = camera_of(options);
   const synth::Renderer renderer(std::move(path), camera, options.seed, options.render);
   const Trajectory& poses = renderer.world_from_camera();

@@ -40,6 +40,13 @@ TEST_F(BadInput, PosesBehindALinkToNowhere) {
   expect_error(run(), 1, {"poses/00.txt", "symbolic links"});
 }
 
+TEST_F(BadInput, ACheckThatCannotBeginIsAnErrorOfJUnit) {
+  expect_error(run_stemvo({"check", folder_ / "no.json", "--baseline", folder_ / "b.json",
+                           "--junit", folder_ / "junit.xml"}),
+               1, {"no.json"});
+  EXPECT_THAT(read_file(folder_ / "junit.xml"), HasSubstr("errors=\"1\""));
+}
+
 TEST_F(BadInput, Configuration) {
   expect_error(run({"--config", "nope"}), 1, {"nope: expected", "default, fast, paper", "neither"});
   expect_error(run({"--config", folder_.path().string()}), 1, {"found a folder"});

@@ -29,14 +29,12 @@ def test_only_results_of_the_same_command_are_replaced(tmp_path):
     out, given = tmp_path / "out", tmp_path / "truth.txt"
     given.write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
     for _ in range(2):
-        runs.open_folder(out, "compare", [given, None, "default"])
+        runs.open_folder(out, "compare")
     with pytest.raises(ValueError, match="results of 'stemvo-lab search', found other files"):
-        runs.open_folder(out, "search", [])
+        runs.open_folder(out, "search")
     with pytest.raises(ValueError, match="found other files"):
-        runs.open_folder(tmp_path, "compare", [])
-    with pytest.raises(ValueError, match="expected a folder that holds no input, found .*truth.txt"):
-        runs.open_folder(tmp_path, "compare", [given])
+        runs.open_folder(tmp_path, "compare")
     with pytest.raises(ValueError, match="can be written"):
-        runs.open_folder(given / "out", "compare", [])
+        runs.open_folder(given / "out", "compare")
     message = CliRunner().invoke(main, ["compare", str(given), "--gt", str(given), "--out", str(tmp_path)]).output
     assert message.startswith("Error: ") and len(message.splitlines()) == 1, message

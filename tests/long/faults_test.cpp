@@ -66,18 +66,6 @@ TEST_F(LongRun, HasItsFramesOnDiskWhileItRuns) {
   EXPECT_NEAR(length_m(poses), length_m(truth), 0.02 * length_m(truth));
 }
 
-TEST_F(LongRun, ASecondProcessIsRefusedUntilTheFirstIsGone) {
-  RunningProgram first(STEMVO_PROGRAM, arguments());
-  wait_for_poses(1);
-  const Words channel = {"channel", drive_.string(), "--out", out_.string()};
-  expect_error(run_stemvo(arguments()), 1, {out_.string(), "no other stemvo writes to"});
-  expect_error(run_stemvo(channel), 1, {out_.string(), "no other stemvo writes to"});
-  first.send(SIGKILL);
-  static_cast<void>(first.wait());
-  EXPECT_EQ(run_stemvo(arguments()).exit_code, 0)
-      << "the lock of a process that was killed is gone";
-}
-
 TEST(SameBytes, TwoRunsAndAnyNumberOfThreadsGiveTheSameBytes) {
   const TempFolder folder;
   const std::string sequence = rendered_drive() / "sequences/00";

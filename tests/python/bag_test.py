@@ -78,6 +78,7 @@ class TestBag:
         assert float(first) == pytest.approx(FIRST_NS * 1e-9, abs=0.5e-5, rel=0)
 
     def test_late_images_are_left_out(self):
+        self.expect_error(["expected stamps that rise, found 4 of 5"], self.write("sqlite3", stamps=[90, 10, 20, 30, 40]), self.out)
         code, said, _ = bags.convert(self.write("bag", stamps=[0, 10, 10, 5, 20]), self.out)
         assert code == 0 and "3 images; 2 of no later time" in said and [time - FIRST_NS for time, _ in self.images()] == [0, 10, 20]
 

@@ -227,12 +227,6 @@ TEST_F(BoardCalibration, ABoardThatIsNamedWrongIsRefused) {
   }
 }
 
-TEST_F(BoardCalibration, APictureIsNotOverwritten) {
-  ASSERT_TRUE(try_to_calibrate("9x6:0.025", print_chessboard({9, 6}, 0.025), 4, 0.6));
-  EXPECT_THAT(message_of(calibrate_photos("9x6:0.025", "photos/00.png")),
-              HasSubstr("expected a file to write that is no input"));
-}
-
 TEST_F(BoardCalibration, DoubtsAboutThePicturesAreSaid) {
   const Print print = print_chessboard({9, 6}, 0.025);
   EXPECT_THAT(calibrate("9x6:0.025", print, 4).warnings, Not(Contains(HasSubstr("16 bits"))));

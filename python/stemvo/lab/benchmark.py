@@ -163,7 +163,7 @@ def command(kitti, out, sequences, configs, overrides, model, trajectories, scal
     methods = methods_of(configs or (() if trajectories and not (overrides or model) else ("default", "paper")),
                          overrides, model, trajectories, scales)
     found = runs.sequences_of(kitti, [name for name in sequences.split(",") if name], frames)
-    runs.open_folder(out, "benchmark", [kitti / "sequences", model, *(line.partition("=")[2] for line in trajectories)])
+    runs.open_folder(out, "benchmark")
     rows, poses = measure_all(methods, found, out)
     click.echo(write_report(out, rows, [*NOTES, *told_best(methods, found, poses)], methods, found, poses))
     failed = rows[rows["state"] == "failed"]

@@ -188,5 +188,5 @@ def command(given, gt, out, align, names, camera, tolerance, first, width):
         raise ValueError(f"--names: expected {len(given)} different names, found {len(titles)}")
     paths = [load(file, name, gt, align, camera, tolerance, first) for file, name in zip(given, titles)]
     found, lines, positions = compare(paths, gt, camera, align)
-    runs.open_folder(out, "compare", [gt, camera, *(path.file for path in paths)])
+    runs.open_folder(out, "compare")
     click.echo(write_report(out, f"{' and '.join(titles)} against {gt.name}", found, lines, positions, ALIGNMENTS[align], width))

@@ -233,6 +233,6 @@ def command(weights, kitti, out, layers, preprocessing, filters, frames, winner,
     chosen = re.fullmatch(r"(\d+):(\d+)", filters or "0:1")
     if not chosen:
         raise ValueError(f"--filters: expected A:B, found '{filters}'")
-    runs.open_folder(out, "paper", [*weights_in(weights), kitti / "sequences"])
+    runs.open_folder(out, "paper")
     click.echo(reproduce(weights, kitti, out, layers, preprocessing, tuple(map(int, chosen.groups())) if filters else None, frames, winner,
                          config, {"DeepVO": deepvo, "TartanVO": tartanvo}))

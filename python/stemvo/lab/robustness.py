@@ -224,7 +224,7 @@ def command(drives, out, frames, kinds, controls, config, overrides, jobs, addre
     planned = [("none", "none", 0.0)] if not asked or "none" in asked else []
     for one in [find(name) for name in asked if name != "none"] if asked else ALL:
         planned += [(one.name, one.group, strength) for strength in one.strengths]
-    open_folder(out, "robustness", [*(f"{drive}/times.txt" for drive in drives), config])
+    open_folder(out, "robustness")
     rows, hashes, program = Rows(out / "rows.csv", COLUMNS, len(KEY)), {drive: drive.hash() for drive in opened}, program_hash()
     tasks = {}
     for kind, _, strength in planned:

@@ -21,13 +21,9 @@ GROUND = (0, 2)  # axes of KITTI's camera along the road
 LENGTH_TOLERANCE_M = 1.5  # between a sequence's path and the official one
 
 
-def open_folder(out, command, inputs):
-    """Creates OUT by the rule of `stemvo run`: a new folder, an empty one or results of the same command, which holds no input."""
-    root, mark = out.resolve(), f"Results of 'stemvo-lab {command}': its next run may replace them.\n"
-    for given in map(pathlib.Path, filter(None, inputs)):
-        # A link to a file may lie in the folder, or lead into it.
-        if given.exists() and any(root in (place, *place.parents) for place in (given.absolute().parent.resolve(), given.resolve().parent)):
-            raise ValueError(f"{out}: expected a folder that holds no input, found {given}")
+def open_folder(out, command):
+    """Creates OUT by the rule of `stemvo run`: a new folder, an empty one or results of the same command."""
+    mark = f"Results of 'stemvo-lab {command}': its next run may replace them.\n"
     if out.is_dir() and any(out.iterdir()) and not ((out / ".stemvo").is_file() and (out / ".stemvo").read_text() == mark):
         raise ValueError(f"{out}: expected a new folder, an empty one or results of 'stemvo-lab {command}', found other files")
     try:

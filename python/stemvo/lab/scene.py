@@ -90,7 +90,7 @@ def command(result, recording, out, kind, camera):
     pinhole = said["camera"]
     intrinsics = {"w": read.camera.width, "h": read.camera.height, "fl_x": pinhole["fx_px"], "fl_y": pinhole["fy_px"],
                   "cx": pinhole["cx_px"] + HALF_PX, "cy": pinhole["cy_px"] + HALF_PX, "k1": pinhole["k1"], "k2": pinhole["k2"]}
-    runs.open_folder(out, "scene", [result / "metrics.json", recording, camera])
+    runs.open_folder(out, "scene")
     names = write_images(read, first, out / "images")
     {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](out, intrinsics, names, poses, points)
     click.echo(f"{out}: {sum(name is not None for name in names)} images, {len(points[0])} points")

@@ -250,7 +250,7 @@ def command(drives, models, out, frames, held_out, held_out_frames, kinds, filte
         layers = layers_of(models, config, overrides, baselines)
         candidates = part_of([(layer, k) for layer in layers if not layer.is_baseline for k in filters_of(layer, filters or ":")], shard)
         candidates += [(layer, k) for layer in layers if layer.is_baseline for k in range(layer.num_filters)]
-        open_folder(out, "search", [*(f"{drive}/times.txt" for drive in (*drives, *held_out)), *models, *others, config])
+        open_folder(out, "search")
         search = Search(seen, Rows(out / "rows.csv", COLUMNS, len(KEY), others), candidates, workers, bar.update)
         search.race(shares)
     table = search.table(shares)
