@@ -89,6 +89,6 @@ def plot(results: Iterable[Any], truth: Any = None, ax: Any = None) -> Any:
         ax.plot(truth[:, 0, 3], truth[:, 2, 3], color="0.6", linewidth=4, label="ground truth")
     places = [result.world_from_camera[:3, 3] for result in results]
     ax.plot([place[0] for place in places], [place[2] for place in places], label="estimate")
-    ax.set(aspect="equal", xlabel="x (right)", ylabel="z (forward)")
+    ax.set(aspect="equal", adjustable="datalim", xlabel="x (right)", ylabel="z (forward)")
     ax.legend()
     return ax

@@ -30,7 +30,7 @@ function theme() {
     colorway: dark.matches ? ["#56b4e9", "#e69f00", "#009e73", "#f0e442", "#cc79a7", "#d55e00"]
                            : ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"],
     margin: { l: 60, r: 20, t: 20, b: 50 }, hovermode: "closest",
-    legend: { orientation: "h", y: 1.02, yanchor: "bottom", traceorder: "normal" },
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom", traceorder: "normal" }, hoverlabel: { namelength: -1 },
     template: { layout: { xaxis: axis, yaxis: axis, scene: { xaxis: space, yaxis: space, zaxis: space } } } };
 }
 
@@ -56,7 +56,7 @@ function colours_of(section, palette) {
 
 // As far away as shows the whole box and the texts around it; the layout says from where.
 function stand_back({ aspectratio, camera: { eye } }, div) {
-  const length = (of) => Math.hypot(...Object.values(of)), texts = 50;  // pixels
+  const length = (of) => Math.hypot(...Object.values(of)), texts = Math.min(50, div.clientHeight / 10);  // pixels
   const visible = Math.min(div.clientWidth, div.clientHeight) / 2;
   const half_angle = Math.atan(Math.tan(Math.PI / 8) * 2 * visible / div.clientHeight);
   const factor = length(aspectratio) / 2 / Math.sin(half_angle) * visible / (visible - texts) / length(eye);
@@ -68,7 +68,7 @@ function layout_of(section, div) {
   if (is_space(section)) {
     layout.margin = { l: 0, r: 0, t: 20, b: 0 };
     stand_back(layout.scene, div);
-    if (is_phone)
+    if (Math.min(div.clientWidth, div.clientHeight) < 500)
       for (const axis of ["xaxis", "yaxis", "zaxis"]) {
         Object.assign(layout.scene[axis], { nticks: 4, tickfont: { size: 10 } });
         layout.scene[axis].title.font = { size: 11 };
@@ -100,10 +100,10 @@ function fit_plot({ layout, traces }, div) {
   const { t, b, l, r } = div._fullLayout._size;
   let height = layout.plot_height, width = div.parentElement.clientWidth - l - r;
   if (is_plan(layout)) {
-    const x = extent(traces, "x"), y = extent(traces, "y"), slimmest = 0.6, highest = Math.max(320, Math.min(0.75 * innerHeight, 700)) - t - b;
+    const x = extent(traces, "x"), y = extent(traces, "y"), slimmest = 0.6, highest = Math.max(360, Math.min(0.75 * innerHeight, 700)) - t - b;
     const aspect = Math.min(Math.max(x / Math.max(y, 1e-9), slimmest), 1 / slimmest);  // width over height
     height = Math.min(width / aspect, highest);
-    width = Math.max(height * aspect, Math.min(width, 140));
+    width = Math.max(height * aspect, Math.min(width, height));  // a slim one lets the legend and the buttons have their place
   }
   const size = { width: Math.ceil(width + l + r), height: Math.ceil(height + t + b) };
   if (Math.abs(size.width - div.clientWidth) + Math.abs(size.height - div.clientHeight) < 3) return;
@@ -146,7 +146,7 @@ function add_figure(parent, drawn) {
   if (follows_frames(section)) {
     const point_at = ({ points }) => {
       const point = points.find((found) => found.curveNumber === section.frame_trace) ?? points[0];
-      const k = point.customdata ?? (point.curveNumber === section.frame_trace ? point.pointNumber : chosen);
+      const k = point.customdata ?? (point.data.x.length === frames.length ? point.pointNumber : chosen);
       if (k !== chosen) requestAnimationFrame(() => choose(k));  // later: drawing a space tells of the hover again
     };
     for (const event of ["plotly_hover", "plotly_click"]) div.on(event, point_at);  // a finger's tap is a click alone

@@ -19,10 +19,10 @@ SLIDER, TOP_VIEW = "#frame", ".figure"
 DRAWN = "figures.every(({ div }) => Math.hypot(div._fullLayout.width - div.clientWidth, div._fullLayout.height - div.clientHeight) < 2)"
 
 
-MIDDLE = """(div) => {  // on the screen: the middle point that the figure's trace of frames has, or its first trace
+MIDDLE = """(div, number) => {  // on the screen: the middle point of a trace; by itself of that of frames
     const { section } = figures.find((figure) => figure.div === div), layout = div._fullLayout;
     const space = layout.scene?._scene, box = (space?.container ?? div).getBoundingClientRect();
-    const { x, y, z, xaxis, yaxis } = section.traces[Math.max(section.frame_trace ?? 0, 0)];
+    const { x, y, z, xaxis, yaxis } = section.traces[number ?? section.frame_trace];
     const known = y.map((_, k) => k).filter((k) => y[k] !== null && x[k] !== null), k = known[Math.floor(known.length / 2)];
     if (!z) {
         const of = (name) => layout[name[0] + "axis" + name.slice(1)], [across, up] = [of(xaxis ?? "x"), of(yaxis ?? "y")];
@@ -98,7 +98,7 @@ def pixels_at_edges_of_spaces(page):
 def buttons_over_legend(page):
     return page.evaluate("""figures.filter(({ div }) => {
         const legend = div.querySelector(".legend"), buttons = div.querySelector(".modebar");
-        return legend && buttons.getBoundingClientRect().bottom > legend.getBoundingClientRect().top; }).length""")
+        return legend && buttons.getBoundingClientRect().bottom > legend.getBoundingClientRect().top; }).map(({ section }) => section.heading)""")
 
 
 def swipe(page):
@@ -120,14 +120,19 @@ def swipe(page):
 
 
 def point_at_each(page, touch):
-    """The label that each figure shows under the mouse or a finger, by its heading; the figures whose label the slider does not follow."""
+    """The label that each trace shows under the mouse or a finger, by heading and name; the traces that the slider does not follow."""
     labels, stays = {}, []
-    for figure in page.locator(".figure").all():
-        heading, label = figure.get_attribute("aria-label"), figure.locator(".hovertext, .hoverlayer .legend").first
+    seen = page.evaluate("""figures.flatMap(({ section }, i) => section.traces.flatMap(({ name, hoverinfo }, k) =>
+        hoverinfo === "skip" ? [] : [[i, k, `${section.heading}, ${name}`]]))""")
+    for i, number, heading in seen:
+        figure = page.locator(".figure").nth(i)
+        label = figure.locator(".hovertext, .hoverlayer .legend").first
+        if not touch:  # where it points at the same frame again nothing would be told
+            page.mouse.move(0, 0)
         page.evaluate("choose(0)")
-        page.evaluate("(top) => scrollBy(0, top - 0.6 * innerHeight)", figure.evaluate(MIDDLE)[1])
+        page.evaluate("(top) => scrollBy(0, top - 0.6 * innerHeight)", figure.evaluate(MIDDLE, number)[1])
         for nudge in (0, 1, -1):  # the first tap wakes a space
-            x, y = figure.evaluate(MIDDLE)
+            x, y = figure.evaluate(MIDDLE, number)
             (page.touchscreen.tap if touch else page.mouse.move)(x + nudge, y)
             with contextlib.suppress(Late):
                 label.wait_for(timeout=1500)
@@ -221,19 +226,19 @@ def look(browser, report, screens, screenshots):
     for width, height, touch in screens:
         page = open_page(browser, report, found, viewport={"width": width, "height": height}, color_scheme="light", has_touch=touch, is_mobile=touch)
         seen = {"width": page.evaluate("document.documentElement.scrollWidth"), "titles_in_the_way": titles_in_the_way(page),
-                "hard_to_read": hard_to_read(page), "at_edges_of_spaces": pixels_at_edges_of_spaces(page), "map": sizes_of_map(page)}
+                "hard_to_read": hard_to_read(page), "buttons_over_legend": buttons_over_legend(page), "at_edges_of_spaces": pixels_at_edges_of_spaces(page), "map": sizes_of_map(page)}
         page.set_viewport_size({"width": height, "height": width})  # turned, and back
         page.wait_for_timeout(1000)
         page.wait_for_function(DRAWN, timeout=20000)
         seen["titles_in_the_way"] += titles_in_the_way(page)
         seen["hard_to_read"] += hard_to_read(page)
+        seen["buttons_over_legend"] += buttons_over_legend(page)
         page.set_viewport_size({"width": width, "height": height})
         page.wait_for_timeout(1000)
         page.wait_for_function(DRAWN, timeout=20000)
         seen["hard_to_read"] += hard_to_read(page)
         seen["labels"], seen["slider_stays"] = point_at_each(page, touch)
         if touch:
-            seen["buttons_over_legend"] = buttons_over_legend(page)
             seen["swiped"] = swipe(page)
         seen["wrong_colours"] = change_theme(page)
         seen["dark"] = page.evaluate("getComputedStyle(document.body).backgroundColor")

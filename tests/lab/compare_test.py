@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 from evo.core import metrics, trajectory
 from evo.tools import file_interface
-from stemvo.lab import bootstrap, compare, tables
+from stemvo.lab import bootstrap, compare, figures, tables
 from stemvo.lab.cli import main
 
 
@@ -85,7 +85,10 @@ def test_names_formats_and_what_belongs_together(tmp_path):
     rows = pd.read_csv(tmp_path / "out/numbers.csv")
     assert rows["path"].tolist() == ["good", "zero motion"] and rows["poses"].tolist() == [360, 360] and rows["ATE, m"][0] < 1.0
     page = (tmp_path / "out/report.html").read_text()
-    assert compare.ALIGNMENTS["sim3"] in page.replace("&#x27;", "'") and "http://" not in page.split("<h1>")[1]
+    assert compare.ALIGNMENTS["sim3"] in page.replace("&#x27;", "'") and "http://" not in page.split("<h1>")[1] and 'name="viewport"' in page
+    assert "<h2>t_rel by segment" in page and page.split("<h1>")[1].count('"paper_bgcolor":"rgba(0,0,0,0)"') == page.count('"namelength":-1') == 4
+    for end, plane in (([0.1, 0.9, 60], [0, 2]), ([9, 1, 0.1], [0, 1]), ([9, 0.1, 1], [0, 2]), ([1, 9, 2], [0, 1])):  # KITTI 06 climbs more than it turns
+        assert figures.plane_of(np.array([[0, 0, 0], end])) == plane
     for figure in ("paths", "position_error_over_distance", "t_rel_by_segment"):
         assert (tmp_path / f"out/{figure}.svg").stat().st_size > 1000 and (tmp_path / f"out/{figure}.pdf").read_bytes()[:5] == b"%PDF-"
 

@@ -66,6 +66,7 @@ def test_a_picture_has_the_path_and_the_truth(seen):
     _, results = seen
     truth = np.stack([result.world_from_camera for result in results]) + 1.0
     axes = stemvo.plot(results, truth, matplotlib.pyplot.figure().add_subplot())
+    assert axes.get_aspect() == 1.0 and axes.get_adjustable() == "datalim"  # a straight drive is no line of six pixels
     lines = {line.get_label(): line.get_xydata() for line in axes.get_lines()}
     np.testing.assert_array_equal(lines["estimate"], [result.world_from_camera[[0, 2], 3] for result in results])
     np.testing.assert_array_equal(lines["ground truth"], lines["estimate"] + 1.0)

@@ -69,8 +69,7 @@ def baseline_rows(sequence):
     for one in runs.published()["published"] if sequence.is_complete else []:
         numbers = {key: one[key].get(sequence.name) for key in NUMBERS}
         if any(number is not None for number in numbers.values()):
-            rows.append(numbers | {"method": one["method"], "scale": one["scale_source"], "alignment": one["alignment"],
-                                   "note": f"published: {one['source']}"})
+            rows.append(numbers | {"method": one["method"], "scale": one["scale_source"], "alignment": one["alignment"], "note": f"published: {one['source']}"})
     return [{"sequence": sequence.name, "frames": sequence.frames_text, "state": "known"} | row for row in rows]
 
 

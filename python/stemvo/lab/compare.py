@@ -120,7 +120,7 @@ def compare(paths, truth_file, camera_file, align):
     rows = [{"path": path.name} | {title: path.metrics[key] for key, title in METRICS.items()} for path in paths]
     rows.append({"path": "zero motion", "poses": len(truth), "ATE, m": still["ate_rmse_m"]["none"], "offset, m": still["average_offset_m"]})
     segments = by_segment(aligned, truth)
-    lines = {"position error over distance": ({name: (along, np.linalg.norm(poses[:, :3, 3] - truth[:, :3, 3], axis=1))
+    lines = {"Position error over distance": ({name: (along, np.linalg.norm(poses[:, :3, 3] - truth[:, :3, 3], axis=1))
                                                for name, poses in aligned.items()}, "distance, m", "position error, m")}
     for column in ("t_rel, %", "r_rel, deg/100 m"):
         by_length = {name: (group["segment, m"].to_numpy(), group[column].to_numpy())
@@ -161,12 +161,12 @@ def write_report(out, title, found, lines, positions, note, width):
         figure, axes = figures.sheet(1, width, 1, 0.62 * figures.WIDTHS_IN[width])
         figures.draw_lines(axes[0], curves, xlabel, ylabel)
         figures.legend(figure, axes)
-        figures.save(figure, out / name.replace(" ", "_"))
+        figures.save(figure, out / name.lower().replace(" ", "_"))
     page.write(out / "report.html", title, [
         ("Numbers", note + ".", tables.formatted(found["numbers"], DECIMALS)),
         *((CAPTIONS["differences"], tables.formatted(found["differences"], DECIMALS)) for _ in [0] if "differences" in found),
         ("Paths", figures.page_paths(positions)),
-        *((name.capitalize(), figures.page_lines(*curves)) for name, curves in lines.items()),
+        *((name, figures.page_lines(*curves)) for name, curves in lines.items()),
         (CAPTIONS["segments"], tables.formatted(found["segments"], DECIMALS))])
     return "\n".join(texts)
 

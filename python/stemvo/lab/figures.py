@@ -12,6 +12,10 @@ WIDTHS_IN = {"column": 3.5, "text": 7.16}  # of two-column journals
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")  # told apart by the colour-blind (Okabe and Ito)
 DASHES = (("-", "solid"), ("--", "dash"), (":", "dot"), ("-.", "dashdot"))  # matplotlib's, plotly's
 TRUTH, TRUTH_COLOR = "ground truth", "#b0b0b0"
+AXIS = {"gridcolor": "rgba(128,128,128,0.25)", "zeroline": False, "automargin": True}  # seen on a light page and on a dark one
+PAGE = {"template": {"layout": {"xaxis": AXIS, "yaxis": AXIS}}, "showlegend": True, "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom"},
+        "margin": {"l": 60, "r": 20, "t": 20, "b": 50}, "hoverlabel": {"namelength": -1}, "modebar": {"color": "#888888", "activecolor": "#888888"},
+        **dict.fromkeys(("paper_bgcolor", "plot_bgcolor", "modebar_bgcolor"), "rgba(0,0,0,0)")}
 plt.rcParams.update({"font.family": "serif", "font.serif": ["STIXGeneral"], "mathtext.fontset": "stix", "font.size": 8, "axes.titlesize": 8,
                      "legend.fontsize": 7, "lines.linewidth": 1.0, "axes.linewidth": 0.6, "pdf.fonttype": 42, "svg.hashsalt": "stemvo",
                      "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False})
@@ -51,8 +55,9 @@ def save(figure, stem):
 
 
 def plane_of(positions):
-    """Indices of the two axes along which these go farthest, in their order: x and z on KITTI."""
-    return sorted(np.argsort(np.ptp(positions, axis=0), kind="stable")[1:])
+    """Indices of the axes of a map from above: x and z of a camera; x and y where the path goes farther along y."""
+    _, along_y, along_z = np.ptp(positions, axis=0)
+    return [0, 1 if along_y > along_z else 2]
 
 
 def draw_paths(axis, paths, title="", axes_of=None):
@@ -74,8 +79,7 @@ def draw_lines(axis, lines, xlabel, ylabel):
     styles = looks(lines)
     for name, (x, y) in lines.items():
         axis.plot(x, y, styles[name][1], color=styles[name][0], label=name)
-    axis.set(xlabel=xlabel, ylabel=ylabel)
-    axis.set_ylim(bottom=0.0)
+    axis.set(xlabel=xlabel, ylabel=ylabel, ylim=(0.0, None))
 
 
 def page_lines(lines, xlabel, ylabel, is_map=False):
@@ -83,9 +87,8 @@ def page_lines(lines, xlabel, ylabel, is_map=False):
     styles = looks(lines)
     figure = go.Figure([go.Scatter(x=x, y=y, name=name, mode="lines", line={"color": styles[name][0], "dash": styles[name][2]})
                         for name, (x, y) in lines.items()])
-    figure.update_layout(template="plotly_white", xaxis_title=xlabel, yaxis_title=ylabel, height=620 if is_map else 420, showlegend=True)
-    figure.update_yaxes(**({"scaleanchor": "x"} if is_map else {"rangemode": "tozero"}))
-    return figure
+    return figure.update_layout(PAGE, xaxis_title=xlabel, yaxis={"title": ylabel} | ({"scaleanchor": "x"} if is_map else {"rangemode": "tozero"}),
+                                height=520 if is_map else 320)
 
 
 def page_paths(paths, axes_of=None):
@@ -100,7 +103,4 @@ def page_bars(bars, title):
                                marker_pattern_shape=("", "/", "x", ".")[index // len(COLORS) % 4])
                         for index, (name, (groups, values)) in enumerate(bars.items())])
     count = sum(len(values) for _, values in bars.values())
-    figure.update_layout(template="plotly_white", xaxis_title=title, height=120 + 18 * count, showlegend=True)
-    figure.update_xaxes(rangemode="tozero")
-    figure.update_yaxes(autorange="reversed", type="category")
-    return figure
+    return figure.update_layout(PAGE, xaxis={"title": title, "rangemode": "tozero"}, yaxis={"autorange": "reversed", "type": "category"}, height=120 + 18 * count)

@@ -84,8 +84,7 @@ def table_1(counted):
 def filters_of(layers, chosen, is_gray):
     """(label, options, note): the input's channels, and each layer's filters. A gray image has one channel, not three."""
     colors = Layer("", "input", 3, "input_layer")
-    inputs = [("Input layer, gray" if is_gray else f"Input layer, {'RGB'[channel]}", colors.options(channel), "")
-              for channel in range(1 if is_gray else 3)]
+    inputs = [("Input layer, gray" if is_gray else f"Input layer, {'RGB'[channel]}", colors.options(channel), "") for channel in range(1 if is_gray else 3)]
     begin, end = chosen or (0, None)
     return inputs + [(f"{layer.network} {layer.name}-{number}", layer.options(number), layer.stand_in)
                      for layer in layers for number in range(layer.filters)[begin:end]]
@@ -182,10 +181,8 @@ def write_document(out, names):
 
 
 def reproduce(weights, kitti, out, layers, preprocessing, chosen, frames, winner, config, others):
-    options, counted = runs.options_of(None if config == "default" else config), {}
-    for file in weights_in(weights):
-        made, totals = export(file, layers, out, preprocessing)
-        counted[file.stem] = made, totals
+    options = runs.options_of(None if config == "default" else config)
+    counted = {file.stem: export(file, layers, out, preprocessing) for file in weights_in(weights)}
     every = [layer for made, _ in counted.values() for layer in made]
     sequences = runs.sequences_of(kitti, SEQUENCES)
     ran = [sequence for sequence in sequences if not sequence.problem and sequence.truth is not None]
