@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <utility>
@@ -15,8 +16,10 @@
 namespace stemvo {
 namespace {
 
-/// Squares of adjustments and of changes of velocity are means of so many: a window's length.
+/// Squares of adjustments are means of so many: a window's length.
 constexpr int kMemory = 8;
+/// Changes of velocity are means over so long: a step of who walks, to either side.
+constexpr double kRemembers_s = 2.0;
 /// Keyframes that an adjustment spreads an error over: the newer half of the window, which it
 /// moves, and the one before.
 constexpr double kSpread = 5.0;
@@ -136,12 +139,12 @@ Matrix6d MotionCovariance::finish(const Motion& motion) {
   Matrix6d pose = transformed(prev_pose_, to_cur);  // until now: of the one before
   Matrix6d covariance = Matrix6d::Zero();
   if (goes_on) {
-    const Matrix6d change = changes_of_velocity(motion);
     const double before_s = std::exchange(unmeasured_s_, unmeasured_s_ + motion.dt_s);
+    const Matrix6d change = change_of_velocity(motion);
     const Vector6d faded = std::exchange(faded_, faded_ + motion.faded);
-    covariance = unmeasured_s_ * motion.dt_s * motion.dt_s * change + square(motion.faded);
-    pose += (std::pow(unmeasured_s_, 3) - std::pow(before_s, 3)) / 3.0 * change + square(faded_) -
-            square(faded);
+    covariance = motion.dt_s * motion.dt_s * change + square(motion.faded);
+    pose += (std::pow(unmeasured_s_, 3) - std::pow(before_s, 3)) / (3.0 * unmeasured_s_) * change +
+            square(faded_) - square(faded);
   } else if (!motion.is_localized || motion.two_view.has_value()) {
     covariance = two_view_motion(motion) + pose;
     pose = motion.is_localized ? Matrix6d::Zero() : covariance;
@@ -171,16 +174,17 @@ void MotionCovariance::rescale(double factor) {
   Vector6d lengths = Vector6d::Ones();
   lengths.head<3>().setConstant(factor);
   const Matrix6d by = lengths.asDiagonal();
-  for (Matrix6d* one : {&prev_pose_, &mean_step_, &mean_change_}) {
+  for (Matrix6d* one : {&prev_pose_, &mean_step_}) {
     *one = transformed(*one, by);
   }
   if (track_noise_) {
     track_noise_ = transformed(*track_noise_, by);
   }
-  for (std::optional<Vector6d>* one : {&step_, &prev_velocity_}) {
-    if (*one) {
-      **one = by * **one;
-    }
+  if (step_) {
+    *step_ = by * *step_;
+  }
+  for (Velocity& velocity : velocities_) {
+    velocity.per_s = by * velocity.per_s;
   }
   faded_ = by * faded_;
   for (Vector6d& influence : influences_.of_point) {
@@ -188,13 +192,38 @@ void MotionCovariance::rescale(double factor) {
   }
 }
 
-Matrix6d MotionCovariance::changes_of_velocity(const Motion& motion) const {
-  if (num_changes_ > 0) {
-    return mean_change_;
+/// Its square since the last measured one, as it was between tracked frames so far apart: a hand
+/// that begins to turn goes on with it, so that changes from frame to frame tell too little.
+Matrix6d MotionCovariance::change_of_velocity(const Motion& motion) const {
+  const double span_s =
+      velocities_.empty() ? 0.0 : velocities_.back().time_s - velocities_.front().time_s;
+  if (!(span_s > 0.0)) {
+    // Nothing is known yet: a whole step, and as much of a turn as leaves anything in view.
+    const double half_view = std::atan(0.5 * motion.camera.width_px / motion.camera.fx_px);
+    return diagonal(motion.usual_step, half_view) * unmeasured_s_ / std::pow(motion.dt_s, 3);
   }
-  // Nothing is known yet: a whole step, and as much of a turn as leaves anything in view.
-  const double half_view = std::atan(0.5 * motion.camera.width_px / motion.camera.fx_px);
-  return diagonal(motion.usual_step, half_view) / std::pow(motion.dt_s, 3);
+  // Of the way and of the turn, alike along all axes: so few frames tell less of directions.
+  const auto squares_after = [&](double lag_s) {
+    Eigen::Array2d sum(0.0, 0.0);
+    int count = 0;
+    auto before = velocities_.begin();
+    for (const Velocity& now : velocities_) {
+      while (std::next(before)->time_s <= now.time_s - lag_s) {
+        ++before;
+      }
+      if (const double apart_s = now.time_s - before->time_s; apart_s >= lag_s) {
+        const Vector6d change = now.per_s - before->per_s;
+        sum += unmeasured_s_ / apart_s *
+               Eigen::Array2d(change.head<3>().squaredNorm(), change.tail<3>().squaredNorm());
+        ++count;
+      }
+    }
+    return (sum / (3 * count)).eval();
+  };
+  constexpr double kNextFrame_s = 1e-9;
+  const Eigen::Array2d sigmas =
+      squares_after(kNextFrame_s).max(squares_after(std::min(unmeasured_s_, 0.5 * span_s))).sqrt();
+  return diagonal(sigmas[0], sigmas[1]);
 }
 
 /// An adjustment takes away the error that has grown since the last one, frame by frame the same
@@ -223,17 +252,16 @@ void MotionCovariance::learn(const Motion& motion) {
     unmeasured_s_ = 0.0;
     faded_.setZero();
   }
-  std::optional<Vector6d> velocity;
+  time_s_ += motion.dt_s;
   if (is_tracked) {
     const Rigid3& step = motion.prev_from_cur;
-    velocity.emplace();
-    *velocity << step.rotation.conjugate() * step.translation, so3_log(step.rotation);
-    *velocity /= motion.dt_s;
-    if (prev_velocity_.has_value()) {
-      add_to_mean(square(*velocity - *prev_velocity_) / motion.dt_s, mean_change_, num_changes_);
+    Vector6d way;
+    way << step.rotation.conjugate() * step.translation, so3_log(step.rotation);
+    velocities_.push_back({time_s_, way / motion.dt_s});
+    while (velocities_.front().time_s < time_s_ - kRemembers_s) {
+      velocities_.pop_front();
     }
   }
-  prev_velocity_ = std::move(velocity);
 }
 
 }  // namespace stemvo

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <deque>
 #include <optional>
 
 #include "geometry/pose_influence.hpp"
@@ -64,7 +65,7 @@ class MotionCovariance {
   void rescale(double factor);
 
  private:
-  [[nodiscard]] Matrix6d changes_of_velocity(const Motion& motion) const;
+  [[nodiscard]] Matrix6d change_of_velocity(const Motion& motion) const;
   [[nodiscard]] Matrix6d map_term(FrameState state);
   void learn(const Motion& motion);
 
@@ -74,7 +75,6 @@ class MotionCovariance {
   Observations prev_points_;
   bool is_prev_localized_ = false;         ///< its pose was measured in the map
   Matrix6d prev_pose_ = Matrix6d::Zero();  ///< covariance of its pose in the map
-  std::optional<Vector6d> prev_velocity_;  ///< per second, where it was tracked
 
   // The frame in work, where it is in the map.
   Observations points_;
@@ -85,8 +85,12 @@ class MotionCovariance {
   Matrix6d mean_step_ = Matrix6d::Zero();  ///< squares, of the last adjustments
   int num_steps_ = 0;
   int frames_since_step_ = 0;
-  Matrix6d mean_change_ = Matrix6d::Zero();  ///< of velocity: squares per second
-  int num_changes_ = 0;
+  struct Velocity {
+    double time_s = 0.0;
+    Vector6d per_s;
+  };
+  std::deque<Velocity> velocities_;  ///< of tracked frames of the last seconds
+  double time_s_ = 0.0;
   double unmeasured_s_ = 0.0;          ///< since the last localized frame
   Vector6d faded_ = Vector6d::Zero();  ///< since then
 };

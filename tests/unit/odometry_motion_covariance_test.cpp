@@ -78,6 +78,33 @@ TEST(MotionCovariance, IsHonestWhereThereIsHardlyAnyParallax) {
   EXPECT_GT(inside, 0.85 * count);
 }
 
+/// Images fail for a quarter of a second while a hand turns to and fro.
+TEST(MotionCovariance, IsHonestWhereNothingIsSeenOfATurn) {
+  constexpr double kInterval_s = 1.0 / 30.0;
+  std::vector<Rigid3> path;
+  for (int i = 0; i < 100; ++i) {
+    path.emplace_back(so3_exp({0.0, 0.3 * std::sin(6.0 * kInterval_s * i), 0.0}),
+                      Eigen::Vector3d(0.02 * i, 0.0, 0.0));
+  }
+  const DriveTracks drive(path, points_of_room(2500, 4.0, 4), 0.1, 4);
+  double worst = 0.0;
+  for (int lost_at = 60; lost_at < 90; lost_at += 4) {
+    WindowEstimator estimator(config_without_scale(), drive.camera);
+    EstimatorRun run(estimator, drive);
+    run.interval_s = kInterval_s;
+    run.add_range(0, lost_at);
+    for (int i = lost_at; i < lost_at + 8; ++i) {
+      run.add_missing();
+      const Rigid3 error = motion_to(estimator.trajectory(), i).inverse() * motion_to(path, i);
+      worst =
+          std::max(worst, so3_log(error.rotation).squaredNorm() /
+                              run.results[i].motion_covariance.bottomRightCorner<3, 3>().trace());
+    }
+  }
+  EXPECT_LT(worst, 2.5 * 2.5);
+  EXPECT_GT(worst, 0.5 * 0.5);
+}
+
 TEST(MotionCovariance, IsFiniteAndPositiveDefiniteInEveryState) {
   std::set<FrameState> seen;
   for (const OdometryMode mode : {OdometryMode::kMap, OdometryMode::kTwoFrame}) {
