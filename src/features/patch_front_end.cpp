@@ -187,14 +187,20 @@ class PatchFrontEnd final : public PointFrontEnd {
     const int top = coarsest - 1;
     const int predicted = std::min(kPredictedLevel, top);
     Motions motions(from.points.size());
-    const auto align = [&](const Point& point, const cv::Point2f& motion, int first_level) {
-      const Track& track = tracks_.at(point.id);
+    std::vector<Track*> tracks;  // of the points
+    for (const Point& point : from.points) {
+      tracks.push_back(&tracks_.at(point.id));
+    }
+    const auto align = [&](std::size_t i, const cv::Point2f& motion, int first_level) {
+      const Point& point = from.points[i];
+      const Track& track = *tracks[i];
       const cv::Point2f start = point.uv + motion;
       return align_patch(track.patch, pyramid, {start.x, start.y, track.warp.a, track.warp.b},
                          first_level);
     };
     const Outlook outlook(from, to);
-    const bool is_turned = outlook.knows_turn() && leads_to_points(outlook, from, align, top);
+    const bool is_turned =
+        outlook.knows_turn() && leads_to_points(outlook, from, tracks, align, top);
     if (is_turned) {
       to.turn = from.turn_to_newest;
     }
@@ -205,11 +211,11 @@ class PatchFrontEnd final : public PointFrontEnd {
     std::vector<PatchMatch> found(from.points.size());
     for (std::size_t i = 0; i < found.size(); ++i) {
       const Point& point = from.points[i];
-      const Track& track = tracks_.at(point.id);
+      const Track& track = *tracks[i];
       if (track.frame == from.frame) {
-        found[i] = align(
-            point, is_turned ? outlook.turned(point.uv, track.motion) : outlook.on(track.motion),
-            predicted);
+        found[i] =
+            align(i, is_turned ? outlook.turned(point.uv, track.motion) : outlook.on(track.motion),
+                  predicted);
         if (found[i].correlation >= kMinCorrelation) {
           motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
         }
@@ -217,14 +223,12 @@ class PatchFrontEnd final : public PointFrontEnd {
     }
     std::vector<std::optional<cv::Point2f>> result(found.size());
     for (std::size_t i = 0; i < found.size(); ++i) {
-      const Point& point = from.points[i];
-      const Track& track = tracks_.at(point.id);
       if (found[i].correlation < kMinCorrelation) {
-        const cv::Point2f motion = near(point.uv);
-        const bool is_predicted = track.frame != from.frame && !motions.empty();
-        found[i] = align(point, motion, is_predicted ? predicted : top);
+        const cv::Point2f motion = near(from.points[i].uv);
+        const bool is_predicted = tracks[i]->frame != from.frame && !motions.empty();
+        found[i] = align(i, motion, is_predicted ? predicted : top);
         if (found[i].correlation < kMinCorrelation && is_predicted) {
-          found[i] = align(point, motion, top);
+          found[i] = align(i, motion, top);
         }
       }
     }
@@ -234,9 +238,9 @@ class PatchFrontEnd final : public PointFrontEnd {
         top < Patch::kNumCoarse && num_found < kFewFound * static_cast<double>(found.size());
     for (std::size_t i = 0; i < found.size(); ++i) {
       const Point& point = from.points[i];
-      Track& track = tracks_.at(point.id);
+      Track& track = *tracks[i];
       if (is_far && !is_found(found[i])) {
-        found[i] = align(point, near(point.uv), coarsest);
+        found[i] = align(i, near(point.uv), coarsest);
         if (is_found(found[i])) {
           motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
         }
@@ -253,6 +257,7 @@ class PatchFrontEnd final : public PointFrontEnd {
   template <typename Align>
   [[nodiscard]] bool leads_to_points(const Outlook& outlook,
                                      const View& from,
+                                     const std::vector<Track*>& tracks,
                                      const Align& align,
                                      int top) const {
     int num_probes = 0;
@@ -261,7 +266,7 @@ class PatchFrontEnd final : public PointFrontEnd {
     const std::size_t step = std::max<std::size_t>(1, from.points.size() / kNumProbes);
     for (std::size_t i = 0; i < from.points.size(); i += step) {
       const Point& point = from.points[i];
-      const Track& track = tracks_.at(point.id);
+      const Track& track = *tracks[i];
       const bool knows_motion = track.frame == from.frame;
       const int level = knows_motion ? std::min(kPredictedLevel, top) : top;
       const cv::Point2f with =
@@ -269,8 +274,8 @@ class PatchFrontEnd final : public PointFrontEnd {
       const cv::Point2f without = knows_motion ? outlook.on(track.motion) : cv::Point2f();
       if (const cv::Point2f off = with - without; off.dot(off) > kSameStart_px * kSameStart_px) {
         ++num_probes;
-        num_with += align(point, with, level).correlation >= kMinCorrelation ? 1 : 0;
-        num_without += align(point, without, level).correlation >= kMinCorrelation ? 1 : 0;
+        num_with += align(i, with, level).correlation >= kMinCorrelation ? 1 : 0;
+        num_without += align(i, without, level).correlation >= kMinCorrelation ? 1 : 0;
       }
     }
     return num_with >= std::max<double>(num_without, kFewFound * num_probes);

@@ -22,6 +22,30 @@ cv::Point pixel_of(const cv::Mat& image, const cv::Point2f& uv) {
 /// several pixels wide, and any pixel of a corner will do.
 std::size_t detection_level(const ImagePyramid& image) { return image.levels.size() > 1 ? 1 : 0; }
 
+/// cv::circle's, drawn once: it takes as long as the corners to draw one around each point.
+class Disc {
+ public:
+  explicit Disc(int radius) : radius_(radius), pixels_(2 * radius + 1, 2 * radius + 1, uchar{0}) {
+    cv::circle(pixels_, {radius, radius}, radius, cv::Scalar(255), cv::FILLED);
+  }
+
+  void clear(cv::Mat& mask, const cv::Point& center) const {
+    const cv::Point corner = center - cv::Point(radius_, radius_);
+    const cv::Rect inside = cv::Rect(corner, pixels_.size()) & cv::Rect({}, mask.size());
+    for (int v = inside.y; v < inside.br().y; ++v) {
+      const uchar* const disc = pixels_.ptr(v - corner.y) + (inside.x - corner.x);
+      uchar* const row = mask.ptr(v) + inside.x;
+      for (int u = 0; u < inside.width; ++u) {
+        row[u] = static_cast<uchar>(row[u] & ~disc[u]);
+      }
+    }
+  }
+
+ private:
+  int radius_;
+  cv::Mat1b pixels_;
+};
+
 }  // namespace
 
 Matches PointFrontEnd::process(std::shared_ptr<const ImagePyramid> image, const ImageClue& clue) {
@@ -154,6 +178,7 @@ void PointFrontEnd::replenish(View& view) {
   if (mask.empty()) {
     mask = cv::Mat(size, CV_8U, cv::Scalar(255));
   }
+  const Disc disc(std::max(1, cvRound(min_distance)));
   std::vector<Point> kept;
   kept.reserve(view.points.size());
   for (const Point& point : view.points) {
@@ -161,7 +186,7 @@ void PointFrontEnd::replenish(View& view) {
     if (mask.at<unsigned char>(center) == 0) {
       continue;  // collides with another point, the older one is kept; or is behind the mask
     }
-    cv::circle(mask, center, std::max(1, cvRound(min_distance)), cv::Scalar(0), cv::FILLED);
+    disc.clear(mask, center);
     quota.take(point.uv);
     kept.push_back(point);
   }

@@ -31,7 +31,9 @@ constexpr double kMuchBetter = 0.05;
 /// A turn that is told worse (1 sigma, pixels of the finest level): a strip, an edge.
 constexpr double kMaxTurnSigma_px = 0.05;
 constexpr int kIterations = 8;
-constexpr double kConverged_px = 0.02;
+constexpr double kConverged_px = 0.1;  ///< of Gauss-Newton: the next step would be a tenth of it
+/// A guess so near the turn that was found is no other one, pixels of the finest level.
+constexpr double kSame_px = 0.25;
 /// Errors below count the same, gray values.
 constexpr double kLeastScale = 1e-3;
 constexpr float kMinAhead = 0.2F;  ///< beyond 78 degrees of turn: out of view
@@ -105,8 +107,9 @@ void for_each_common(const Template& prev,
   const std::size_t stride = cur.pixels.step1();
   for (std::size_t i = 0; i < prev.plane.size(); ++i) {
     const Eigen::Vector3f ray = turn * prev.plane[i].homogeneous();
-    const float u = ray.x() / ray.z() * cur.focal_px.x() + cur.center_px.x();
-    const float v = ray.y() / ray.z() * cur.focal_px.y() + cur.center_px.y();
+    const float inverse_z = 1.0F / ray.z();
+    const float u = ray.x() * inverse_z * cur.focal_px.x() + cur.center_px.x();
+    const float v = ray.y() * inverse_z * cur.focal_px.y() + cur.center_px.y();
     if (ray.z() > kMinAhead && u >= 0.0F && v >= 0.0F && u < right && v < bottom) {
       const int x = static_cast<int>(u);
       const int y = static_cast<int>(v);
@@ -304,8 +307,9 @@ std::optional<Eigen::Quaterniond> ImageTurn::align(const ImagePyramid& image,
   if (!(sigma_px < kMaxTurnSigma_px) || !(found >= kMinLikeness)) {
     return std::nullopt;
   }
-  const Eigen::Quaterniond guess = hint.value_or(expected_);
-  refutes_guess_ = likeness(prev.front(), last_.front(), guess.conjugate()) < found - kMuchBetter;
+  const Eigen::Quaterniond guess = hint.value_or(expected_).conjugate();
+  refutes_guess_ = guess.angularDistance(turn) * last_.front().focal_px.mean() > kSame_px &&
+                   likeness(prev.front(), last_.front(), guess) < found - kMuchBetter;
   rad_per_s_ = so3_log(turn.conjugate()) / interval_s;
   return turn.conjugate();
 }

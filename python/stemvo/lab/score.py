@@ -14,6 +14,7 @@ from stemvo.lab.runs import image_sizes
 
 MIN_SIDE_PX = 16  # of a channel: room for the windows of a tracker and for motion
 MIN_TRACKED = 0.5  # share of the motions that are measured; less: the pose was not detected
+MOST_AT_ONCE = 128  # channels: a filter sees some frames before the next one does, so that its tracks stay in the processor's cache
 MOST_KEPT = 96  # odometries of a process, some 2 MB each
 
 
@@ -136,11 +137,13 @@ class _Run:
 
     def go_on(self, filters, end):
         self.filters = {k: self.filters[k] for k in filters}
-        for i in range(self.at, end):
-            image, time = self.recording[i]
-            channels = None if image is None else self.stem.apply(image, self.recording.camera, min(filters), max(filters) + 1)
+        first, at_once = min(filters), min(8, max(1, MOST_AT_ONCE // len(filters)))
+        for at in range(self.at, end, at_once):
+            frames = [self.recording[i] for i in range(at, min(at + at_once, end))]
+            seen = [(image, time, None if image is None else self.stem.apply(image, self.recording.camera, first, max(filters) + 1)) for image, time in frames]
             for k, one in self.filters.items():
-                one.process(None if channels is None else channels[k - min(filters)], image, time)
+                for image, time, channels in seen:
+                    one.process(channels[k - first] if channels else None, image, time)
         self.at = max(self.at, end)
         return {k: one.row(self.truth) for k, one in self.filters.items()}
 

@@ -16,6 +16,7 @@ class Processes:
 
     def __init__(self, jobs):
         context = multiprocessing.get_context("spawn")
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy's threads in each worker would wait for work in a loop
         self._pools = [concurrent.futures.ProcessPoolExecutor(1, context, _Worker) for _ in range(jobs)]
         self.workers = range(jobs)
         for pool in self._pools:
