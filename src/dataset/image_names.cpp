@@ -272,33 +272,6 @@ Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) 
   return {};
 }
 
-/// Error: dates with the year last that fall from one name to the next.
-Status check_dates(const std::vector<fs::path>& files, const fs::path& given) {
-  static const std::regex kDate(
-      "(.*[^0-9])?([0-3][0-9])[-_. ]?([0-3][0-9])[-_. ]?((19|20)[0-9]{2})([^0-9].*)?");
-  bool is_month_first = false;
-  for (const fs::path& file : files) {
-    const std::string stem = file.stem().string();
-    std::smatch found;
-    if (!std::regex_match(stem, found, kDate)) {
-      return {};
-    }
-    is_month_first = is_month_first || found[3] > "12";
-  }
-  std::string last;
-  for (const fs::path& file : files) {
-    const std::string date =
-        std::regex_replace(file.stem().string(), kDate, is_month_first ? "$4$2$3" : "$4$3$2");
-    if (date < std::exchange(last, date)) {
-      return fail(fmt::format(
-          "{}: expected names in the order of time, as with the year before month and day, found "
-          "{}; a quoted pattern takes one day",
-          given.string(), file.filename().string()));
-    }
-  }
-  return {};
-}
-
 /// All larger rises are those of a clock's digits (hhmmss, with fractions or without) into the next
 /// minute or hour.
 bool are_of_clock(const std::vector<double>& rises, double step) {
@@ -326,7 +299,6 @@ void sort_images(std::vector<fs::path>& files) {
 }
 
 Status check_image_names(const std::vector<fs::path>& files, const fs::path& given) {
-  STEMVO_TRY(check_dates(files, given));
   STEMVO_TRY(check_numbers(files, given));
   return check_names(files, given);
 }

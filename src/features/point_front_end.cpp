@@ -32,13 +32,7 @@ class Disc {
   void clear(cv::Mat& mask, const cv::Point& center) const {
     const cv::Point corner = center - cv::Point(radius_, radius_);
     const cv::Rect inside = cv::Rect(corner, pixels_.size()) & cv::Rect({}, mask.size());
-    for (int v = inside.y; v < inside.br().y; ++v) {
-      const uchar* const disc = pixels_.ptr(v - corner.y) + (inside.x - corner.x);
-      uchar* const row = mask.ptr(v) + inside.x;
-      for (int u = 0; u < inside.width; ++u) {
-        row[u] = static_cast<uchar>(row[u] & ~disc[u]);
-      }
-    }
+    mask(inside).setTo(cv::Scalar(0), pixels_(inside - corner));
   }
 
  private:

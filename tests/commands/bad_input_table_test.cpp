@@ -40,12 +40,6 @@ std::vector<Fault> faults(const std::string& number) {
   const auto with_number = [&](const std::string& text) {
     return with([=](const std::string& whole) { return replace_first(whole, number, text); });
   };
-  const auto link_to = [](const char* target) {
-    return [target](const fs::path& file) {
-      fs::remove(file);
-      fs::create_symlink(target, file);
-    };
-  };
   return {
       {"cut", with([](const std::string& whole) { return whole.substr(0, whole.size() / 2); })},
       {"binary", with([](const std::string&) {
@@ -55,8 +49,6 @@ std::vector<Fault> faults(const std::string& number) {
          return bytes;
        })},
       {"zeros", with([](const std::string&) { return std::string(5000, '\0'); })},
-      {"one long word", with([](const std::string&) { return std::string(1 << 20, 'x'); })},
-      {"open brackets", with([](const std::string&) { return std::string(100000, '['); })},
       {"NaN", with_number("nan")},
       {"infinity", with_number("inf")},
       {"1e300", with_number("1e300")},
@@ -70,13 +62,6 @@ std::vector<Fault> faults(const std::string& number) {
          fs::create_directory(file);
        }},
       {"missing", [](const fs::path& file) { fs::remove(file); }},
-      {"link to nowhere", link_to("none")},
-      {"device", link_to("/dev/zero")},
-      {"unreadable",
-       [](const fs::path& file) {
-         ::geteuid() == 0 ? static_cast<void>(fs::remove(file))
-                          : fs::permissions(file, fs::perms::none);
-       }},
   };
 }
 
