@@ -42,13 +42,23 @@ std::string text_of(nb::handle value) {
   return PyBool_Check(value.ptr()) ? (value.is(Py_True) ? "true" : "false") : utf8_of(value);
 }
 
-void apply(Config& config, const nb::dict& values) {
+/// `section`: "" or one's name and a dot.
+void set_all(Config& config, const std::string& section, const nb::dict& values) {
   for (const auto& [key, value] : values) {
-    const Status status = apply_override(config, utf8_of(key) + "=" + text_of(value));
+    const std::string name = section + utf8_of(key);
+    if (nb::isinstance<nb::dict>(value)) {  // as `stemvo --dump-config` prints them
+      set_all(config, name + ".", nb::cast<nb::dict>(value));
+      continue;
+    }
+    const Status status = apply_override(config, name + "=" + text_of(value));
     if (!status) {
       throw nb::value_error(in_python(status.error().message).c_str());
     }
   }
+}
+
+void apply(Config& config, const nb::dict& values) {
+  set_all(config, "", values);
   value_or_raise(validate(config));
 }
 
@@ -135,7 +145,7 @@ void bind_options_class(nb::module_& module) {
           [](Config* self, const nb::object& values) { new (self) Config(config_of(values)); },
           "values"_a = nb::dict(),
           nb::sig("def __init__(self, values: dict[str, typing.Any] = {}) -> None"),
-          "E.g. {'stem.filter': 3}; ValueError: a bad key or value")
+          "E.g. {'stem.filter': 3}, or {'stem': {'filter': 3}}; ValueError: a bad key or value")
       .def_static(
           "driving",
           [](double height_m) {

@@ -104,7 +104,7 @@ for keyframe in keyframes:
     assert plain[keyframe.frame].timestamp == keyframe.timestamp
     assert np.array_equal(plain[keyframe.frame].world_from_camera, keyframe.world_from_camera)
 assert repr(keyframes[1]).startswith(f"Keyframe(frame: {keyframes[1].frame}, id: 1, timestamp: ") and "world_from_camera: 4x4" in repr(keyframes[1])
-assert "positions: " in repr(changes) and repr(stemvo.Options({"stem.filter": 3})) == "Options({'stem.filter': '3'})" and repr(stemvo.Options()) == "Options({})"
+assert "positions: " in repr(changes) and repr(stemvo.Options({"stem": {"filter": 3}})) == repr(stemvo.Options({"stem.filter": 3})) == "Options({'stem.filter': '3'})" and repr(stemvo.Options()) == "Options({})"
 keys = {"features.ratio": 0.7, "features.klt_levels": 3, "stem.sampling_px": 2, "stem.filter": 3}
 assert repr(stemvo.Options(keys)) == "Options({'stem.filter': '3', 'stem.sampling_px': '2', 'features.klt_levels': '3', 'features.ratio': '0.7'})"  # as in the file
 assert len(metres.keyframes(1)) == len(keyframes) - 1
