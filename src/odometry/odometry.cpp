@@ -138,6 +138,7 @@ struct OdometryHandle::Impl {
                             double time_s,
                             const FrameHints& hints,
                             bool is_kept) {
+    STEMVO_TRY(check_not_in_callback("push"));
     const std::lock_guard lock(turn);
     if (const std::lock_guard results_lock(results_mutex); results.size() >= kMaxWaiting) {
       return fail("push: expected next() to take the results, found " +
@@ -167,6 +168,7 @@ struct OdometryHandle::Impl {
     return result;
   }
   [[nodiscard]] Status reset() {
+    STEMVO_TRY(check_not_in_callback("reset"));
     const std::lock_guard lock(turn);
     if (!loops.reset()) {
       return loops.has_thrown() ? ended() : fail("reset: expected none after finish(), found one");
@@ -259,6 +261,7 @@ Status OdometryHandle::save_map(const std::filesystem::path& file) const {
 
 Status OdometryHandle::load_map(const std::filesystem::path& file) {
   STEMVO_TRY(check_in_use(impl_));
+  STEMVO_TRY(impl_->check_not_in_callback("load_map"));
   const std::lock_guard lock(impl_->turn);
   STEMVO_TRY(impl_->check.check_none_admitted(file.string()));
   return impl_->odometry.load_map(file);
@@ -308,7 +311,6 @@ Status AsyncOdometry::push(const cv::Mat& image,
                            double time_s,
                            const FrameHints& hints) {
   STEMVO_TRY(check_in_use(impl_));
-  STEMVO_TRY(impl_->check_not_in_callback("push"));
   return impl_->push(image, order, time_s, hints, false);
 }
 
@@ -336,7 +338,6 @@ Status AsyncOdometry::finish() {
 
 Status AsyncOdometry::reset() {
   STEMVO_TRY(check_in_use(impl_));
-  STEMVO_TRY(impl_->check_not_in_callback("reset"));
   return impl_->reset();
 }
 

@@ -193,13 +193,30 @@ TEST_F(Async, WhatWouldWaitForItselfInTheCallbackIsAnError) {
     std::vector<std::string> errors;
     odometry = create(threads, [&](const FrameResult&) {
       errors = {message_of(push(*odometry, 5)), message_of(odometry->finish()),
-                message_of(odometry->reset()), message_of(odometry->next())};
+                message_of(odometry->reset()), message_of(odometry->next()),
+                message_of(odometry->load_map("place.map"))};
     });
     ASSERT_TRUE(push(*odometry, 0));
     EXPECT_TRUE(odometry->finish());
-    EXPECT_THAT(errors, ::testing::ElementsAre(HasSubstr("push"), HasSubstr("finish"),
-                                               HasSubstr("reset"), HasSubstr("next")));
+    EXPECT_THAT(errors,
+                ::testing::ElementsAre(HasSubstr("push"), HasSubstr("finish"), HasSubstr("reset"),
+                                       HasSubstr("next"), HasSubstr("load_map")));
   }
+}
+
+TEST_F(Async, NorDoesAFrameWaitForItselfInItsLog) {
+  Odometry odometry = Odometry::create(frames().camera, with_threads(1)).value();
+  int num_lines = 0;
+  odometry.set_log([&](LogLevel, const std::string&) {
+    ++num_lines;
+    odometry.reset();  // does nothing here
+    EXPECT_THAT(message_of(odometry.process(frames().images[0], frames().order, 1e6)),
+                HasSubstr("found one in it"));
+  });
+  for (std::size_t i = 0; i < frames().images.size(); ++i) {
+    EXPECT_TRUE(odometry.process(frames().images[i], frames().order, time_s(i)));
+  }
+  EXPECT_GT(num_lines, 0);
 }
 
 TEST_F(Async, AfterAResetTheWorldIsNew) {
