@@ -25,18 +25,17 @@ std::size_t detection_level(const ImagePyramid& image) { return image.levels.siz
 /// cv::circle's, drawn once: it takes as long as the corners to draw one around each point.
 class Disc {
  public:
-  explicit Disc(int radius) : radius_(radius), pixels_(2 * radius + 1, 2 * radius + 1, uchar{0}) {
+  explicit Disc(int radius) : pixels_(2 * radius + 1, 2 * radius + 1, uchar{0}) {
     cv::circle(pixels_, {radius, radius}, radius, cv::Scalar(255), cv::FILLED);
   }
 
   void clear(cv::Mat& mask, const cv::Point& center) const {
-    const cv::Point corner = center - cv::Point(radius_, radius_);
+    const cv::Point corner = center - cv::Point(pixels_.cols / 2, pixels_.rows / 2);
     const cv::Rect inside = cv::Rect(corner, pixels_.size()) & cv::Rect({}, mask.size());
     mask(inside).setTo(cv::Scalar(0), pixels_(inside - corner));
   }
 
  private:
-  int radius_;
   cv::Mat1b pixels_;
 };
 

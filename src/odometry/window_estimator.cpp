@@ -309,6 +309,7 @@ void WindowEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
     Keyframe& newest = window_.keyframes.back();
     if (newest.frame == frame.matches.prev_frame) {
       add_begun_points(frame.matches, localized.inlier_mask, newest.points);
+      history_.window_moved();  // landmarks are placed by the newest keyframe that shows them
     }
   }
   if (is_localized(frame)) {

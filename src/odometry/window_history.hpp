@@ -35,8 +35,9 @@ class WindowHistory {
   /// The window is put into other units.
   void rescale(double factor) {
     scale_ *= factor;
-    window_moved_at_ = now();
+    window_moved();
   }
+  void window_moved() { window_moved_at_ = now(); }
   /// The window's unit in that of a keyframe's pose in the trajectory; a keyframe of the window
   /// whose frame has ended.
   [[nodiscard]] double units(int frame) const { return scale_of_keyframe_.at(frame) / scale_; }

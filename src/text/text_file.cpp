@@ -235,8 +235,7 @@ Expected<Unit> find_unit(const std::vector<TimedRow>& rows, const UsualTimes& us
   if (is_short(kUnits[0])) {
     return kUnits[0];
   }
-  constexpr double kRare_s = 600.0;  // rows since 1970 may be so far apart
-  const bool may_be_rare = step <= kRare_s && is_since_1970(kUnits[0]);
+  const bool may_be_rare = step <= 600.0 && is_since_1970(kUnits[0]);  // photos, 10 minutes apart
   std::vector<Unit> usual_units;
   std::optional<Unit> of_span;
   for (const Unit& unit : kUnits) {

@@ -48,12 +48,9 @@ std::vector<Fault> faults(const std::string& number) {
          std::ranges::generate(bytes, [&] { return static_cast<char>(random()); });
          return bytes;
        })},
-      {"zeros", with([](const std::string&) { return std::string(5000, '\0'); })},
       {"NaN", with_number("nan")},
       {"infinity", with_number("inf")},
       {"1e300", with_number("1e300")},
-      {"1e999", with_number("1e999")},
-      {"hexadecimal", with_number("0x1p3")},
       {"decimal comma", with_number("1,5 ,")},
       {"a word", with_number("street")},
       {"folder",
@@ -108,8 +105,6 @@ TEST_F(BadInputTable, Calibration) {
   expect_refused_with_faults(
       sequence_ / "calib.txt", "361", run(), {},
       {large(), text("tiny focal length", "P2: 1e-300 0 310 0 0 1e-300 94 0 0 0 1 0\n"),
-       text("centre far away", "P2: 361 0 1e300 0 0 361 94 0 0 0 1 0\n"),
-       text("offset far away", "P2: 361 0 310 1e200 0 361 94 0 0 0 1 0\n"),
        text("of images twice as large", "P2: 722 0 609 0 0 722 172 0 0 0 1 0\n"),
        text("a view of 172 degrees", "P2: 20 0 310 0 0 20 94 0 0 0 1 0\n"),
        text("negative focal length", "P2: -361 0 310 0 0 361 94 0 0 0 1 0\n")});

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""KITTI's rectified images still have a lens, which bends what turns show: without metres, lengths drift until it is taken out."""
+"""On clips: KITTI's rectified images still have a lens, which bends what turns show; maps that are followed."""
 
 import json
 import os
@@ -7,6 +7,7 @@ import pathlib
 import subprocess
 
 import pytest
+import stemvo
 
 
 def run(tmp_path, refine):
@@ -23,3 +24,15 @@ def test_lengths_drift_less_where_the_lens_is_learnt(tmp_path):
     assert given["camera"]["k1"] == 0.0 and 0.01 < learnt["camera"]["k1"] < 0.025
     assert learnt["ate_rmse_m"]["sim3"] < 0.5 * given["ate_rmse_m"]["sim3"]  # found 0.40 m
     assert learnt["t_rel_percent"] < 2.4  # found 1.55; 3.62 before it was learnt
+
+
+@pytest.mark.skipif("STEMVO_SHARED_DATA" not in os.environ, reason="STEMVO_SHARED_DATA is not set")
+def test_who_follows_the_changes_of_a_map_has_the_map():
+    recording = stemvo.read_recording(os.environ["STEMVO_SHARED_DATA"] + "/handheld", frames="0:80")
+    odometry, followed, version = stemvo.Odometry(recording.camera), {}, 0
+    for image, time in recording:
+        odometry.process(image, time)
+        changes, whole = odometry.landmarks_since(version), odometry.landmarks_since(0)
+        version = changes.version
+        followed |= dict(zip(changes.ids, map(tuple, changes.positions)))
+        assert all(followed[one] == tuple(place) for one, place in zip(whole.ids, whole.positions))
