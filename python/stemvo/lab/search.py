@@ -243,15 +243,15 @@ def command(drives, models, out, frames, held_out, held_out_frames, kinds, filte
     seen += [score.Drive(str(pathlib.Path(drive).resolve()), held_out_frames, held_out=True) for drive in held_out]
     if twice := [name for name, count in collections.Counter((drive.name, drive.held_out) for drive in seen).items() if count > 1]:
         raise ValueError(f"DRIVE: expected each name once, found {twice[0][0]} twice")
+    layers = layers_of(models, config, overrides, baselines)
     if planned:
-        return click.echo(plan(planned, layers_of(models, config, overrides, False), seen, jobs or len(os.sched_getaffinity(0))))
-    shares = SHARES[-1:] if exhaustive else SHARES
-    with work.workers(jobs, address, ray) as workers, tqdm.tqdm(unit=" filter-frames", disable=None) as bar:  # they start meanwhile
-        layers = layers_of(models, config, overrides, baselines)
-        candidates = part_of([(layer, k) for layer in layers if not layer.is_baseline for k in filters_of(layer, filters or ":")], shard)
-        candidates += [(layer, k) for layer in layers if layer.is_baseline for k in range(layer.num_filters)]
-        open_folder(out, "search")
-        search = Search(seen, Rows(out / "rows.csv", COLUMNS, len(KEY), others), candidates, workers, bar.update)
+        return click.echo(plan(planned, layers, seen, jobs or len(os.sched_getaffinity(0))))
+    candidates = part_of([(layer, k) for layer in layers if not layer.is_baseline for k in filters_of(layer, filters or ":")], shard)
+    candidates += [(layer, k) for layer in layers if layer.is_baseline for k in range(layer.num_filters)]
+    open_folder(out, "search")
+    rows, shares = Rows(out / "rows.csv", COLUMNS, len(KEY), others), SHARES[-1:] if exhaustive else SHARES
+    with work.workers(jobs, address, ray) as workers, tqdm.tqdm(unit=" filter-frames", disable=None) as bar:
+        search = Search(seen, rows, candidates, workers, bar.update)
         search.race(shares)
     table = search.table(shares)
     click.echo(write_results(out, table))
