@@ -16,7 +16,6 @@
 #include "mapping/pose_graph.hpp"
 #include "odometry/phased_odometry.hpp"
 #include "pipeline/frame_pipeline.hpp"
-#include "pipeline/out_folder.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
 #include "try.hpp"

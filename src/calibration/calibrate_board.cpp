@@ -14,7 +14,6 @@
 #include "dataset/listing.hpp"
 #include "dataset/video_stream.hpp"
 #include "io/image_file.hpp"
-#include "pipeline/out_folder.hpp"
 #include "report/frame_image.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"

@@ -218,7 +218,7 @@ Matrix6d MotionCovariance::change_of_velocity(const Motion& motion) const {
         ++count;
       }
     }
-    return (sum / (3 * count)).eval();
+    return (sum / (3 * std::max(count, 1))).eval();
   };
   constexpr double kNextFrame_s = 1e-9;
   const Eigen::Array2d sigmas =

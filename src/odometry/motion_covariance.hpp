@@ -25,8 +25,8 @@ namespace stemvo {
 ///   frames share cancels (a patch's own error, its landmark's).
 /// - The map: what an adjustment at a keyframe moves was an error until then.
 /// - A motion model's share of the pose: what it expects to be wrong.
-/// - A pose that goes on unmeasured: the changes of velocity so far, as a random walk, and the
-///   speed that was let go.
+/// - A pose that goes on unmeasured: how much velocities changed over as long a time, and the speed
+///   that was let go.
 /// - The camera's principal point; the scale.
 class MotionCovariance {
  public:
