@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include <opencv2/core/types.hpp>
+
 #include "evaluation/trajectory.hpp"
 #include "synth/scene.hpp"
 #include "synth/synth.hpp"
@@ -45,6 +47,12 @@ struct RoadPart {
   int shift;
 };
 
+/// Two knots at one place: there the road leaves an earlier part of itself, which goes on.
+struct Fork {
+  int earlier;
+  int later;
+};
+
 /// A polyline with an up direction at each point.
 struct Path {
   std::vector<Vec3> points;
@@ -71,12 +79,18 @@ class RoadCurve {
   [[nodiscard]] const RoadPart& part_of(int knot) const {
     return *std::ranges::upper_bound(parts_, knot, {}, &RoadPart::end);
   }
+  [[nodiscard]] int home(int knot) const { return knot - part_of(knot).shift; }
+  [[nodiscard]] const std::vector<Fork>& forks() const { return forks_; }
+  /// Whether a thing of the street at `knot`, so far from its middle, would stand on the road (from
+  /// beyond the sidewalk: on it, too) that goes another way at a fork.
+  [[nodiscard]] bool is_in_the_way(int knot, double lateral_m, const Vec3& point) const;
   /// Between the knots: position by cubic Hermite, so that a camera on it moves smoothly.
   [[nodiscard]] RoadFrame at(double arc_m) const;
 
  private:
   std::vector<RoadFrame> knots_;
   std::vector<RoadPart> parts_;
+  std::vector<Fork> forks_;
 };
 
 /// The mean around each value, weighted by how far the others are from it. At the ends the window
@@ -122,6 +136,12 @@ inline constexpr double kDriveRate_hz = 10.0;
 /// the same street; its poses are lifted there to the street's height, and are kept exactly
 /// elsewhere.
 [[nodiscard]] Drive make_drive_along(const Trajectory& world_from_camera);
+
+/// Length of the piece of ground that a house and its garden take.
+inline constexpr double kLot_m = 16.0;
+
+/// Knots that are seen from `arc_m`: the road itself, then, where it forks, the other ways.
+[[nodiscard]] std::vector<cv::Range> ways_in_view(const RoadCurve& road, double arc_m);
 
 /// The street near `arc_m`: from 60 m behind to 170 m ahead. `crossings`: knots, where it was seen
 /// first, in the middle of roads that cross.

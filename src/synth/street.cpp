@@ -41,7 +41,7 @@ struct Street {
     });
   }
   [[nodiscard]] bool is_crossed(int knot) const { return is_crossed(home(knot), home(knot) + 1); }
-  [[nodiscard]] int home(int knot) const { return knot - road.part_of(knot).shift; }
+  [[nodiscard]] int home(int knot) const { return road.home(knot); }
   /// Coordinates of the road's texture, near 0 around the camera.
   [[nodiscard]] double u_m(int knot) const {
     const auto& [begin, end, shift] = road.part_of(knot);
@@ -59,34 +59,18 @@ struct Street {
     }
   }
   /// The road at `arc_m`; nullopt: a tight turn leaves the street less than that share of its
-  /// width.
+  /// width, or a road goes there at a fork.
   [[nodiscard]] std::optional<RoadFrame> roomy(double arc_m,
                                                double lateral_m,
                                                double share = 0.75) const {
     const RoadFrame frame = road.at(arc_m);
-    return frame.squeeze(lateral_m) < share ? std::nullopt : std::optional(frame);
+    return frame.squeeze(lateral_m) < share ||
+                   road.is_in_the_way(static_cast<int>(arc_m), lateral_m,
+                                      frame.point(lateral_m, 0.0))
+               ? std::nullopt
+               : std::optional(frame);
   }
 };
-
-/// Last knot from `start` in direction `step` before the road comes back near the way from `from`,
-/// a knot on the other side of `start`.
-int last_clear_knot(const RoadCurve& road, int from, int start, int step, double reach_m) {
-  constexpr double kClear_m = 2.0 * kStreetHalfWidth_m;
-  constexpr int kNeighbours = 45;  // knots: nearer ones are the same street
-  const int end = start + step * static_cast<int>(reach_m);
-  for (int i = start; i != end; i += step) {
-    const int next = i + step;
-    if (next < 0 || next >= road.num_knots()) {
-      return i;
-    }
-    for (int j = from; (next - j) * step >= kNeighbours; j += step) {
-      if ((road.knot(next).position - road.knot(j).position).norm() < kClear_m) {
-        return i;
-      }
-    }
-  }
-  return end;
-}
 
 struct Corner {
   int knot;  ///< 0 or 1
@@ -137,7 +121,10 @@ void add_ground(const Street& street) {
     const auto right = left + 1;
     for (int i = street.window.start; i + 1 < street.window.end; ++i) {
       const bool is_crossed = street.is_crossed(i);
-      if (is_crossed && left->lateral_m == right->lateral_m) {
+      const double middle_m = 0.5 * (left->lateral_m + right->lateral_m);
+      if ((is_crossed && left->lateral_m == right->lateral_m) ||
+          (left->material != materials::asphalt &&
+           street.road.is_in_the_way(i, 0.0, street.road.knot(i).point(middle_m, 0.0)))) {
         continue;
       }
       const Style style{.material = is_crossed ? materials::asphalt : left->material,
@@ -173,7 +160,8 @@ void add_borders(const Street& street) {
   for (const double side : {-1.0, 1.0}) {
     const double lateral_m = side * kStreetHalfWidth_m;
     for (int i = street.window.start; i + 1 < street.window.end; ++i) {
-      if (street.is_crossed(i)) {
+      const Vec3 middle = street.road.at(i + 0.5).point(lateral_m, 0.0);
+      if (street.is_crossed(i) || street.road.is_in_the_way(i, lateral_m, middle)) {
         continue;
       }
       Draw draw(street.seed, 'B', side > 0.0, street.home(i) / 16);
@@ -192,7 +180,6 @@ void add_borders(const Street& street) {
   }
 }
 
-constexpr double kLot_m = 16.0;
 const std::array<Rgb, 8> kPlaster = {{{0.78F, 0.76F, 0.70F},
                                       {0.72F, 0.64F, 0.48F},
                                       {0.62F, 0.60F, 0.57F},
@@ -217,6 +204,15 @@ void add_building(const Street& street, Draw draw, double side, double arc_m) {
       street.road.at(0.5 * (begin_m + end_m)).up,
       {.material = materials::facade},
       street.scene};
+  for (int i = 0; i <= 8; ++i) {
+    const RoadFrame along = street.road.at(begin_m + i * (end_m - begin_m) / 8.0);
+    for (const double across_m : {front_m, back_m}) {
+      if (street.road.is_in_the_way(static_cast<int>(arc_m), across_m,
+                                    along.point(across_m, 0.0))) {
+        return;
+      }
+    }
+  }
   // A house does not lean with the street.
   const double level = house.up.dot(house.plan[0] + house.plan[1]) / 2.0;
   for (Vec3& corner : house.plan) {
@@ -305,15 +301,27 @@ void add_poles(const Street& street) {
   });
 }
 
-/// Nothing stands in the way of the street the camera is in: the window ends where the road comes
-/// back to itself.
-cv::Range visible_window(const RoadCurve& road, double arc_m) {
-  constexpr double kSeenBehind_m = 60.0;
-  constexpr double kSeenAhead_m = 170.0;
-  constexpr int kBeside = 30;  // what is ahead must not stand in the street just behind the camera
-  const int here = std::clamp(static_cast<int>(arc_m), 0, road.num_knots() - 1);
-  const int last = last_clear_knot(road, std::max(here - kBeside, 0), here, 1, kSeenAhead_m);
-  return {last_clear_knot(road, last, here, -1, kSeenBehind_m), last + 1};
+void add_part(const Street& street) {
+  add_ground(street);
+  add_borders(street);
+  street.for_each_lot('H', kLot_m, std::bind_front(add_building, std::cref(street)));
+  add_plants(street);
+  add_poles(street);
+  street.for_each_slot(6.5, [&](int slot, double slot_m) {
+    constexpr double kParked_m = 3.35;  // at the kerb on the right
+    Draw draw(street.seed, 'C', slot);
+    auto place = street.roomy(slot_m + draw.in(0.5, 1.4), kParked_m, 0.95);
+    if (place && draw.chance(0.3)) {
+      place->position = place->point(kParked_m, 0.0);
+      add_car(*place, draw, false, street.scene, true);
+    }
+  });
+  for (int i = street.window.start; i < street.window.end; ++i) {
+    if (std::ranges::find(street.crossings, street.home(i)) != street.crossings.end()) {
+      add_side_streets(street.road.knot(i), hash_of(street.seed, 'Q', street.home(i)),
+                       street.scene);
+    }
+  }
 }
 
 }  // namespace
@@ -323,24 +331,8 @@ void add_street(const RoadCurve& road,
                 std::uint64_t seed,
                 Scene& scene,
                 const std::vector<int>& crossings) {
-  const Street street{road, arc_m, visible_window(road, arc_m), seed, crossings, scene};
-  add_ground(street);
-  add_borders(street);
-  street.for_each_lot('H', kLot_m, std::bind_front(add_building, std::cref(street)));
-  add_plants(street);
-  add_poles(street);
-  street.for_each_slot(6.5, [&](int slot, double slot_m) {
-    Draw draw(seed, 'C', slot);
-    auto place = street.roomy(slot_m + draw.in(0.5, 1.4), 1.0, 0.95);
-    if (place && draw.chance(0.3)) {
-      place->position = place->point(3.35, 0.0);  // parked at the kerb on the right
-      add_car(*place, draw, false, scene, true);
-    }
-  });
-  for (int i = street.window.start; i < street.window.end; ++i) {
-    if (std::ranges::find(crossings, street.home(i)) != crossings.end()) {
-      add_side_streets(road.knot(i), hash_of(seed, 'Q', street.home(i)), scene);
-    }
+  for (const cv::Range& way : ways_in_view(road, arc_m)) {
+    add_part({road, arc_m, way, seed, crossings, scene});
   }
 }
 

@@ -12,7 +12,7 @@ import subprocess
 
 RENDERED = "rendered.json"  # written last: a drive without it is not complete
 
-WORLD = 2  # raised when the renderer makes another world of the same poses
+WORLD = 3  # raised when the renderer makes another world of the same poses
 
 
 class DriveError(Exception):
