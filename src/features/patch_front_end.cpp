@@ -34,10 +34,17 @@ constexpr int kPredictedLevel = 1;
 /// Where fewer of the points are found, they have moved further than the levels asked for reach:
 /// those that are missing are looked for from one coarser level on.
 constexpr double kFewFound = 0.3;
+/// Where fewer of those whose motion is known are found, the light may have changed unevenly (fog,
+/// the edge of a shadow), which only the finest level allows for: it looks alone, and must be
+/// surer.
+constexpr double kMostFound = 0.6;
+constexpr float kFoundAlone = 0.8F;
 /// So many points say whether a hint of the turn leads to them.
 constexpr std::size_t kNumProbes = 40;
 /// A hint that moves a start by less says what is expected anyway.
 constexpr float kSameStart_px = 1.0F;
+
+bool is_found(const PatchMatch& match) { return match.correlation >= kMinCorrelation; }
 
 /// Motions of points between two images.
 class Motions {
@@ -207,32 +214,30 @@ class PatchFrontEnd final : public PointFrontEnd {
     const auto near = [&](const cv::Point2f& uv) {
       return motions.empty() && is_turned ? outlook.turned(uv) : motions.near(uv);
     };
-    // First the points that were tracked to here: they tell the others where to look.
     std::vector<PatchMatch> found(from.points.size());
+    // First the points that were tracked to here: they tell the others where to look.
+    const auto known_motion = [&](std::size_t i) {
+      const cv::Point2f& motion = tracks[i]->motion;
+      return is_turned ? outlook.turned(from.points[i].uv, motion) : outlook.on(motion);
+    };
+    find_known(from, tracks, align, known_motion, predicted, found);
     for (std::size_t i = 0; i < found.size(); ++i) {
-      const Point& point = from.points[i];
-      const Track& track = *tracks[i];
-      if (track.frame == from.frame) {
-        found[i] =
-            align(i, is_turned ? outlook.turned(point.uv, track.motion) : outlook.on(track.motion),
-                  predicted);
-        if (found[i].correlation >= kMinCorrelation) {
-          motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
-        }
+      if (is_found(found[i])) {
+        const cv::Point2f& uv = from.points[i].uv;
+        motions.add(uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - uv);
       }
     }
     std::vector<std::optional<cv::Point2f>> result(found.size());
     for (std::size_t i = 0; i < found.size(); ++i) {
-      if (found[i].correlation < kMinCorrelation) {
+      if (!is_found(found[i])) {
         const cv::Point2f motion = near(from.points[i].uv);
         const bool is_predicted = tracks[i]->frame != from.frame && !motions.empty();
         found[i] = align(i, motion, is_predicted ? predicted : top);
-        if (found[i].correlation < kMinCorrelation && is_predicted) {
+        if (!is_found(found[i]) && is_predicted) {
           found[i] = align(i, motion, top);
         }
       }
     }
-    const auto is_found = [](const PatchMatch& one) { return one.correlation >= kMinCorrelation; };
     const auto num_found = static_cast<double>(std::ranges::count_if(found, is_found));
     const bool is_far =
         top < Patch::kNumCoarse && num_found < kFewFound * static_cast<double>(found.size());
@@ -250,6 +255,30 @@ class PatchFrontEnd final : public PointFrontEnd {
       }
     }
     return result;
+  }
+
+  /// Points that were tracked to `from` are looked for where their motion leads.
+  template <typename Align, typename Motion>
+  static void find_known(const View& from,
+                         const std::vector<Track*>& tracks,
+                         const Align& align,
+                         const Motion& motion,
+                         int level,
+                         std::vector<PatchMatch>& found) {
+    const auto is_known = [&](const Track* track) { return track->frame == from.frame; };
+    const auto look = [&](int first_level, float least) {
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        if (is_known(tracks[i]) && !is_found(found[i])) {
+          const PatchMatch match = align(i, motion(i), first_level);
+          found[i] = match.correlation >= least ? match : found[i];
+        }
+      }
+    };
+    look(level, kMinCorrelation);
+    const auto num_known = static_cast<double>(std::ranges::count_if(tracks, is_known));
+    if (static_cast<double>(std::ranges::count_if(found, is_found)) < kMostFound * num_known) {
+      look(0, kFoundAlone);
+    }
   }
 
   /// A hint may be wrong: it counts where it leads to points, and to as many as no hint does.

@@ -272,6 +272,22 @@ TEST(PatchFrontEnd, LooksWhereTheTurnLeadsUnlessItLeadsNowhere) {
   EXPECT_EQ(found_by(-200.0).track_ids, unknown.track_ids);
 }
 
+TEST(PatchFrontEnd, BandsOfShadowBetweenTwoImagesEndFewTracks) {
+  const auto front_end = create_front_end({});
+  const auto show = [&](int i, double shadow) {
+    cv::Mat image = textured_image({480, 200}, {2.0 * i, 0.0});
+    for (int x = 0; x < image.cols; ++x) {
+      image.col(x) *= 1.0 - shadow * (0.5 + 0.5 * std::tanh(20.0 * std::sin(0.05 * x + i)));
+    }
+    return matches_of(*front_end, image_of(image), {.frame = i});
+  };
+  static_cast<void>(show(0, 0.0));
+  const auto all = static_cast<double>(show(1, 0.0).cur_uv.size());
+  const Matches matches = show(2, 0.7);
+  EXPECT_GT(static_cast<double>(matches.cur_uv.size()), 0.75 * all);
+  EXPECT_LT(median_error_px(matches, {-2.0, 0.0}), 0.1);
+}
+
 TEST(GridQuota, GivesEveryCellItsShare) {
   FeatureOptions options{.max_features = 24, .grid_columns = 4, .grid_rows = 3};
   GridQuota quota(options, {400, 300});
