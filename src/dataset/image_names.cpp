@@ -3,14 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <map>
 #include <regex>
 #include <set>
 #include <tuple>
-#include <utility>
 
 #include <fmt/format.h>
 
@@ -25,33 +24,33 @@ constexpr std::string_view kDigitCharacters = "0123456789";
 
 bool is_digit(char c) { return kDigitCharacters.find(c) != std::string_view::npos; }
 
+/// Where the digits from `begin` on end.
+std::size_t end_of_digits(std::string_view name, std::size_t begin) {
+  return std::min(name.find_first_not_of(kDigitCharacters, begin), name.size());
+}
+
 /// Each whole number becomes '0', the number of its digits without leading zeros, and these
 /// digits: compared as text, it is compared by its value. With `has_decimals` digits behind "7."
 /// are its decimals.
 std::string sort_key(std::string_view name, bool has_decimals) {
   std::string key;
-  const auto take_digits = [&name] {
-    const std::size_t length = std::min(name.find_first_not_of(kDigitCharacters), name.size());
-    const std::string_view digits = name.substr(0, length);
-    name.remove_prefix(length);
-    return digits;
-  };
-  while (!name.empty()) {
-    if (!is_digit(name.front())) {
-      key += name.front();
-      name.remove_prefix(1);
+  for (std::size_t i = 0; i < name.size();) {
+    if (!is_digit(name[i])) {
+      key += name[i];
+      ++i;
       continue;
     }
-    std::string_view number = take_digits();
-    number.remove_prefix(std::min(number.find_first_not_of('0'), number.size()));
+    const std::size_t begin = std::min(name.find_first_not_of('0', i), name.size());
+    i = end_of_digits(name, begin);
     key += '0';
-    key += static_cast<char>(number.size());  // names have at most 255 characters
-    key += number;
+    key += static_cast<char>(i - begin);  // names have at most 255 characters
+    key += name.substr(begin, i - begin);
     if (has_decimals) {
       key += '.';
-      if (name.size() > 1 && name.front() == '.' && is_digit(name[1])) {
-        name.remove_prefix(1);
-        key += take_digits();
+      if (i + 1 < name.size() && name[i] == '.' && is_digit(name[i + 1])) {
+        const std::size_t decimals = i + 1;
+        i = end_of_digits(name, decimals);
+        key += name.substr(decimals, i - decimals);
       }
       key += '\0';
     }
@@ -72,7 +71,7 @@ std::string numbers_of(const fs::path& file) {
   const std::string stem = file.stem().string();
   std::string numbers;
   for (std::size_t i = stem.find_first_of(kDigitCharacters); i < stem.size();) {
-    const std::size_t end = std::min(stem.find_first_not_of(kDigitCharacters, i), stem.size());
+    const std::size_t end = end_of_digits(stem, i);
     if (i < 2 || stem[i - 1] != '.' || !is_digit(stem[i - 2])) {  // else decimals
       i = std::min(stem.find_first_not_of('0', i), end - 1);      // a zero alone stays
     }
@@ -82,15 +81,16 @@ std::string numbers_of(const fs::path& file) {
   return numbers;
 }
 
-/// A name around its last number: "cam1_", "7" and "" of "cam1_007.png".
+/// A name around its last number: "cam1_", 7 and "" of "cam1_007".
 struct NameParts {
   std::string before;
-  std::string number;  ///< without leading zeros; a decimal one between _ or -: "0.033"
+  double number = 0.0;  ///< a decimal one between _ or -: 0.033
   std::string behind;
+
+  [[nodiscard]] std::string pattern() const { return before + "*" + behind; }
 };
 
-NameParts parts_of(const fs::path& file) {
-  const std::string stem = file.stem().string();
+NameParts parts_of(const std::string& stem) {
   const auto start_of = [&](std::size_t end) {
     return end == 0 ? 0 : stem.find_last_not_of(kDigitCharacters, end - 1) + 1;
   };
@@ -102,174 +102,81 @@ NameParts parts_of(const fs::path& file) {
     start = whole < start - 1 && is_apart ? whole : start;
   }
   const std::string number = stem.substr(start, end - start);
-  return {stem.substr(0, start),
-          number.substr(std::min(number.find_first_not_of('0'), number.size())), stem.substr(end)};
+  return {stem.substr(0, start), std::strtod(number.c_str(), nullptr), stem.substr(end)};
 }
 
 /// The error that two images may be of one time, with a pattern that tells the first from the
 /// other.
-Error one_time(const fs::path& given, const fs::path& file, const fs::path& other) {
-  const NameParts parts = parts_of(file);
-  const NameParts others = parts_of(other);
-  const bool is_named_alike = parts.before == others.before && parts.behind == others.behind;
-  const std::string pattern = is_named_alike
-                                  ? "*" + other.extension().string()
-                                  : parts.before + "*" + parts.behind + file.extension().string();
+Error one_time(const fs::path& given,
+               const fs::path& file,
+               const fs::path& other,
+               const std::string& pattern) {
   return fail(fmt::format(
-      "{}: expected one image of each number, found {} and {}; a quoted pattern tells which, "
-      "as '{}'",
-      given.string(), file.filename().string(), other.filename().string(),
-      (file.parent_path() / pattern).string()));
+      "{}: expected one image of each time, found {} beside {}; a quoted pattern tells which, as "
+      "'{}'",
+      given.string(), other.filename().string(), file.filename().string(),
+      (file.parent_path() / (pattern + file.extension().string())).string()));
 }
 
-/// The least and the largest.
-std::pair<double, double> span_of(const std::set<std::string>& numbers) {
-  std::set<double> values;
-  for (const std::string& number : numbers) {
-    values.insert(std::strtod(number.c_str(), nullptr));
-  }
-  return {*values.begin(), *values.rbegin()};
-}
+/// Images that may be a camera's own.
+struct Group {
+  fs::path first;
+  std::string pattern;            ///< of their names, without the ending
+  std::set<double> numbers = {};  ///< of the frames
+};
+using Groups = std::map<std::string, Group>;  // by what the camera may be called
 
-/// Whole minutes: the numbers are seconds, which go on from one beginning to the next ("12-30-59",
-/// "12-31-00") in their usual step. `before`: one of the beginnings.
-bool are_seconds(const std::string& before, const std::set<std::string>& numbers) {
-  static const std::regex kMinute("(.*[^0-9])?([01][0-9]|2[0-3])[^0-9]?[0-5][0-9][^0-9]");
-  constexpr double kMinute_s = 60.0;
-  const auto [first, last] = span_of(numbers);
-  const double step_s = (last - first) / static_cast<double>(numbers.size() - 1);
-  return last < kMinute_s && kMinute_s + first - last < 1.5 * step_s &&
-         std::regex_match(before, kMinute);
-}
-
-constexpr std::size_t kMostCameras = 6;
-
-/// Numbers alone ("_0", "_1") are cameras' where a few follow each other, many times: else they may
-/// be seconds.
-bool may_be_cameras(const std::set<std::string>& names, std::size_t num_moments) {
-  constexpr std::size_t kMany = 5;
-  std::set<double> numbers;
-  for (const std::string& name : names) {
-    if (std::ranges::any_of(name, [](unsigned char c) { return std::isalpha(c) != 0; })) {
-      return names.size() > 1;
-    }
-    numbers.insert(std::strtod(name.c_str() + std::min<std::size_t>(name.size(), 1), nullptr));
-  }
-  return names.size() > 1 && names.size() <= kMostCameras && num_moments >= kMany &&
-         *numbers.rbegin() - *numbers.begin() + 1.0 == static_cast<double>(names.size());
-}
-
-/// Error: frames of several cameras in pairs ("7_cam0", "7_cam1") or in turns ("7_cam0", "8_cam1"),
-/// or an image beside its copy ("7 (1).png").
-Status check_names(const std::vector<fs::path>& files, const fs::path& given) {
-  static const std::regex kCopy("(.+?)( \\([0-9]+\\)|[ _-]+[Cc]opy.*)");
-  static const std::regex kCamera(
-      "(.*[0-9][^0-9]*?)([_-]?[A-Za-z]{2,}[_-]?[0-9]|[_.-][A-Za-z][0-9]|[_-][0-9]{1,2})");
-  std::set<std::string> stems;
-  std::set<std::string> moments;
-  std::set<std::string> cameras;
-  std::string last;
-  std::size_t num_turns = 0;
-  for (const fs::path& file : files) {
-    const std::string stem = file.stem().string();
-    std::smatch part;
-    const bool has_camera = std::regex_match(stem, part, kCamera);
-    moments.insert(has_camera ? part[1].str() : stem);
-    const std::string camera = has_camera ? part[2].str() : "";
-    num_turns += std::exchange(last, camera) == camera ? 0U : 1U;
-    cameras.insert(camera);
-    stems.insert(stem);
-  }
-  const auto fail_of = [&](const fs::path& file, const std::string& frames) {
-    return fail(fmt::format(
-        "{}: expected frames of one camera alone, found {}; a quoted pattern tells which, as '{}'",
-        given.string(), file.filename().string(),
-        (file.parent_path() / ("*" + frames + file.extension().string())).string()));
-  };
-  constexpr double kMost = 0.9;  // some frames may be missing
-  const auto num_pairs = static_cast<double>(moments.size() * cameras.size());
-  const auto num_files = static_cast<double>(files.size());
-  const bool take_turns = cameras.size() <= kMostCameras && files.size() >= 3 * cameras.size() &&
-                          moments.size() == files.size() &&
-                          static_cast<double>(num_turns) > kMost * num_files;
-  if (may_be_cameras(cameras, moments.size()) && moments.size() > cameras.size() &&
-      (num_files > kMost * num_pairs || take_turns)) {
-    return fail_of(files[1], *cameras.begin());
-  }
-  for (const fs::path& file : files) {
-    const std::string stem = file.stem().string();
-    std::smatch part;
-    if (std::regex_match(stem, part, kCopy) && stems.contains(part[1])) {
-      return fail_of(file, "[0-9]");
-    }
-  }
-  return {};
-}
-
-/// Two beginnings of names may be of two cameras: their letters differ ("left_", "right_"), or one
-/// digit behind letters ("cam0_", "cam1_"), and not the digits of a date or an hour.
-bool tell_cameras(const NameParts& a, const NameParts& b) {
-  static const std::regex kNumbered("[^0-9]*[A-Za-z][^0-9]*[0-9][^0-9]*");
-  const auto letters_of = [](const NameParts& parts) {
-    std::string name = parts.before + parts.behind;
-    std::erase_if(name, [](unsigned char c) { return std::isdigit(c) != 0; });
-    return name;
-  };
-  return letters_of(a) != letters_of(b) ||
-         (std::regex_match(a.before, kNumbered) && std::regex_match(b.before, kNumbered));
-}
-
-/// About as many of each, over much of the same span.
-bool are_of_one_time(const std::set<std::string>& a, const std::set<std::string>& b) {
-  constexpr std::size_t kMin = 3;
+/// Error: two groups are cameras: they have about as many frames, `least` or more, over much of the
+/// same span.
+Status check_groups(Groups groups, std::size_t least, const fs::path& given) {
   constexpr double kAlike = 0.8;
-  const auto [first_a, last_a] = span_of(a);
-  const auto [first_b, last_b] = span_of(b);
-  const auto [fewer, more] = std::minmax({a.size(), b.size()});
-  return fewer >= kMin && static_cast<double>(fewer) >= kAlike * static_cast<double>(more) &&
-         std::min(last_a, last_b) - std::max(first_a, first_b) >
-             kAlike * std::max(last_a - first_a, last_b - first_b);
+  std::erase_if(groups, [&](const auto& group) { return group.second.numbers.size() < least; });
+  const auto are_cameras = [&](const auto& one, const auto& next) {
+    const std::set<double>& a = one.second.numbers;
+    const std::set<double>& b = next.second.numbers;
+    const auto [fewer, more] = std::minmax({a.size(), b.size()});
+    const double longer = std::max(*a.rbegin() - *a.begin(), *b.rbegin() - *b.begin());
+    const double shared = std::min(*a.rbegin(), *b.rbegin()) - std::max(*a.begin(), *b.begin());
+    return shared > kAlike * longer &&
+           static_cast<double>(fewer) >= kAlike * static_cast<double>(more);
+  };
+  const auto found = std::ranges::adjacent_find(groups, are_cameras);
+  if (found == groups.end()) {
+    return {};
+  }
+  const Group& group = found->second;
+  return one_time(given, group.first, std::next(found)->second.first, group.pattern);
 }
 
-/// Error: two images of one number, which are two cameras or one picture twice; or names with the
-/// same last numbers behind several beginnings (cam1_, cam2_), which are as many cameras. Where
-/// there are more beginnings than numbers, they are hours or seconds; so are whole minutes.
-Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) {
-  struct Group {
-    std::set<std::string> numbers;
-    fs::path first;
-  };
-  std::map<std::string, fs::path> seen;
-  std::map<std::pair<std::string, std::string>, Group> groups;
+/// Error: frames of several cameras, which are called behind the number ("7_cam0", "7_cam1") or
+/// elsewhere ("left_7", "right_7"). More names than frames of each are hours or seconds.
+Status check_cameras(const std::vector<fs::path>& files, const fs::path& given) {
+  static const std::regex kBehind(
+      "(.*[0-9][^0-9]*?)([_-]?[A-Za-z]{2,}[_-]?[0-9]|[_.-][A-Za-z][0-9]|[_-][0-4])");
+  // Few digits behind a letter or before the number may be a camera's; others are of a time.
+  static const std::regex kTimes(
+      "((?:^|[^0-9])[A-Za-z](?:[0-9]{1,2}|[_-][0-9])(?![0-9])|^[0-9]{1,2}_$)|[0-9]+");
+  Groups behind;
+  Groups elsewhere;
+  std::size_t num_behind = 0;
   for (const fs::path& file : files) {
-    const std::string numbers = numbers_of(file);
-    const auto [other, is_new] = seen.emplace(numbers, file);
-    if (!is_new && !numbers.empty()) {
-      return one_time(given, other->second, file);
+    const std::string stem = file.stem().string();
+    if (std::smatch match; std::regex_match(stem, match, kBehind)) {
+      const std::string camera = match[2];
+      Group& group = behind.try_emplace(camera, Group{file, "*" + camera}).first->second;
+      group.numbers.insert(parts_of(match[1]).number);
+      ++num_behind;
     }
-    const NameParts parts = parts_of(file);
-    Group& group = groups[{parts.before, parts.behind}];
-    group.first = group.numbers.empty() ? file : group.first;
+    const NameParts parts = parts_of(stem);
+    const std::string camera = std::regex_replace(parts.before, kTimes, "$1") + parts.behind;
+    Group& group = elsewhere.try_emplace(camera, Group{file, parts.pattern()}).first->second;
     group.numbers.insert(parts.number);
   }
-  std::map<std::set<std::string>, std::vector<fs::path>> cameras;
-  for (const auto& [name, group] : groups) {
-    cameras[group.numbers].push_back(group.first);
+  if (5 * num_behind >= 4 * files.size()) {  // masks and a sixth camera may lie beside
+    const bool is_number = behind.begin()->first.size() == 2;  // "_0" may be a part of a second
+    STEMVO_TRY(check_groups(behind, is_number ? 5 : 3, given));
   }
-  for (const auto& [numbers, firsts] : cameras) {
-    if (firsts.size() > 1 && numbers.size() >= firsts.size() && numbers.size() > 1 &&
-        !are_seconds(parts_of(firsts[0]).before, numbers)) {
-      return one_time(given, firsts[0], firsts[1]);
-    }
-  }
-  // Cameras whose numbers are their own, but of one time.
-  for (auto b = groups.begin(), a = b; b != groups.end(); a = b++) {
-    if (a != b && tell_cameras(parts_of(a->second.first), parts_of(b->second.first)) &&
-        are_of_one_time(a->second.numbers, b->second.numbers)) {
-      return one_time(given, a->second.first, b->second.first);
-    }
-  }
-  return {};
+  return check_groups(elsewhere, elsewhere.size(), given);
 }
 
 /// All larger rises are those of a clock's digits (hhmmss, with fractions or without) into the next
@@ -299,8 +206,16 @@ void sort_images(std::vector<fs::path>& files) {
 }
 
 Status check_image_names(const std::vector<fs::path>& files, const fs::path& given) {
-  STEMVO_TRY(check_numbers(files, given));
-  return check_names(files, given);
+  std::map<std::string, fs::path> seen;
+  for (const fs::path& file : files) {
+    const std::string numbers = numbers_of(file);
+    const auto [other, is_new] = seen.emplace(numbers, file);
+    if (!is_new && !numbers.empty()) {  // two cameras, or one picture twice
+      const fs::path& first = other->second;
+      return one_time(given, first, file, parts_of(first.stem().string()).pattern());
+    }
+  }
+  return check_cameras(files, given);
 }
 
 std::vector<double> count_frames(const std::vector<fs::path>& files,
@@ -308,10 +223,9 @@ std::vector<double> count_frames(const std::vector<fs::path>& files,
   std::vector<double> rises;
   bool is_count = files.size() > 1;
   for (std::size_t i = 1; i < files.size(); ++i) {
-    const NameParts last = parts_of(files[i - 1]);
-    const NameParts next = parts_of(files[i]);
-    rises.push_back(std::strtod(next.number.c_str(), nullptr) -
-                    std::strtod(last.number.c_str(), nullptr));
+    const NameParts last = parts_of(files[i - 1].stem().string());
+    const NameParts next = parts_of(files[i].stem().string());
+    rises.push_back(next.number - last.number);
     is_count = is_count && next.before == last.before && next.behind == last.behind;
   }
   const double least = is_count ? std::ranges::min(rises) : 1.0;

@@ -20,8 +20,7 @@ void sort_images(std::vector<std::filesystem::path>& files);
 /// each other, else evenly. A warning: numbers are missing.
 [[nodiscard]] std::vector<double> count_frames(const std::vector<std::filesystem::path>& files,
                                                std::vector<std::string>& warnings);
-/// Error, of what was `given`: the files are of several cameras, or one picture twice, or dates put
-/// them in another order than time.
+/// Error, of what was `given`: the files are of several cameras, or one picture twice.
 [[nodiscard]] Status check_image_names(const std::vector<std::filesystem::path>& files,
                                        const std::filesystem::path& given);
 /// An image without a number among those that have one: a mask, a picture of the board. Empty:

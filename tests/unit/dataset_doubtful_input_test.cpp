@@ -121,7 +121,7 @@ TEST_F(DoubtfulInput, CamerasOfColmap) {
 
 TEST_F(DoubtfulInput, FramesThatAreThereTwiceAreRefused) {
   const FrameSourceRequest same = write_images({"f1.png", "f2.png", "f2.jpg"});
-  EXPECT_THAT(error_of(same), AllOf(HasSubstr("f2."), HasSubstr("/*.png'")));
+  EXPECT_THAT(error_of(same), AllOf(HasSubstr("f2."), HasSubstr("/f*.jpg'")));
   FrameSourceRequest stereo = write_images({"left_01.png", "left_02.png", "right_1.png"});
   EXPECT_THAT(error_of(stereo), AllOf(HasSubstr("left_01.png"), HasSubstr("right_1.png")));
   stereo.sequence_dir /= "left_*.png";
@@ -154,21 +154,16 @@ TEST_F(DoubtfulInput, FramesThatAreThereTwiceAreRefused) {
       EXPECT_EQ(error_of(write_images(names)) == "no error", *format != 'c') << names.back();
     }
   }
-  EXPECT_THAT(
-      error_of(write_images({"01_01_00.png", "01_01_01.png", "01_02_00.png", "01_02_01.png"})),
-      HasSubstr("01_02_00.png"));
+  EXPECT_THAT(error_of(write_images({"0_00.png", "0_01.png", "1_00.png", "1_01.png"})),
+              HasSubstr("1_00.png"));
 }
 
-TEST_F(DoubtfulInput, PairsOfCamerasBehindTheNumberCopiesAndAMaskAreNoFrames) {
+TEST_F(DoubtfulInput, PairsOfCamerasBehindTheNumberAndAMaskAreNoFrames) {
   FrameSourceRequest pairs = write_images(
       {"1_cam0.png", "1_cam1.png", "2_cam0.png", "2_cam1.png", "3_cam0.png", "3_cam1.png"});
   EXPECT_THAT(error_of(pairs), AllOf(HasSubstr("found 1_cam1.png"), HasSubstr("*_cam0.png'")));
   pairs.sequence_dir /= "*_cam0.png";
   EXPECT_EQ(open_source(pairs)->files.size(), 3U);
-  FrameSourceRequest copied = write_images({"7.png", "7 (1).png", "8.png"});
-  EXPECT_THAT(error_of(copied), AllOf(HasSubstr("7 (1).png"), HasSubstr("*[0-9].png'")));
-  copied.sequence_dir /= "*[0-9].png";
-  EXPECT_EQ(open_source(copied)->files.size(), 2U);
   const auto masked = open_source(write_images({"1.png", "2.png", "3.png", "mask.png"}));
   EXPECT_THAT(masked->warnings, ElementsAre(HasSubstr("mask.png: has no number")));
   EXPECT_THAT(
@@ -178,6 +173,8 @@ TEST_F(DoubtfulInput, PairsOfCamerasBehindTheNumberCopiesAndAMaskAreNoFrames) {
   for (const auto& two_cameras : std::vector<std::vector<std::string>>{
            {"01_0.png", "01_1.png", "02_0.png", "02_1.png", "03_0.png", "03_1.png", "04_0.png",
             "04_1.png", "05_0.png", "05_1.png"},
+           {"cam10_7.png", "cam10_8.png", "cam11_7.png", "cam11_8.png"},
+           {"l_17.png", "l_27.png", "l_37.png", "mask.png", "r_18.png", "r_28.png", "r_38.png"},
            {"1-c0.png", "1-c1.png", "2-c0.png", "2-c1.png", "3-c0.png", "3-c1.png"},
            {"cam0_170.png", "cam0_270.png", "cam0_370.png", "cam1_171.png", "cam1_271.png",
             "cam1_371.png"},
@@ -192,6 +189,7 @@ TEST_F(DoubtfulInput, PairsOfCamerasBehindTheNumberCopiesAndAMaskAreNoFrames) {
   }
   for (const auto& one_camera : std::vector<std::vector<std::string>>{
            {"5.05.png", "5.25.png", "5.3.png", "5.5.png"},
+           {"100_000.png", "100_500.png", "101_000.png", "101_500.png"},
            {"1.1.png", "1.9.png", "1.10.png", "1.11.png"},
            {"1700000001_033333333.png", "1700000001_066666666.png", "1700000002_000000000.png",
             "1700000002_033333333.png"},
