@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "config/config_yaml.hpp"
-#include "text/text_file.hpp"
 #include "try.hpp"
 
 namespace stemvo {
@@ -62,10 +61,7 @@ std::vector<config::Key> keys_of(Config& config) {
 }  // namespace
 
 Expected<Config> load_config(const std::filesystem::path& file) {
-  STEMVO_TRY_GET(const auto root,
-                 read_text_file(file, kMaxSettings_MB).and_then([&](const std::string& text) {
-                   return config::parse_document(text, file.string());
-                 }));
+  STEMVO_TRY_GET(const auto root, config::read_document(file));
   Config result;
   result.file = file;
   std::vector<config::Key> keys = keys_of(result);

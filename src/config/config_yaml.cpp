@@ -2,8 +2,8 @@
 #include "config/config_yaml.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <map>
+#include <optional>
 #include <ranges>
 #include <sstream>
 
@@ -71,6 +71,9 @@ std::string_view kind_of(const YAML::Node& node) {
 /// Finds where documents begin: YAML::Load reads the first and leaves out others without a word,
 /// and YAML::LoadAll never ends on some texts.
 class DocumentLines final : public YAML::EventHandler {
+  using Text = const std::string&;
+  using Style = YAML::EmitterStyle::value;
+
  public:
   std::vector<int> lines;
 
@@ -78,19 +81,10 @@ class DocumentLines final : public YAML::EventHandler {
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
   void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnScalar(const YAML::Mark&,
-                const std::string&,
-                YAML::anchor_t,
-                const std::string&) override {}
-  void OnSequenceStart(const YAML::Mark&,
-                       const std::string&,
-                       YAML::anchor_t,
-                       YAML::EmitterStyle::value) override {}
+  void OnScalar(const YAML::Mark&, Text, YAML::anchor_t, Text) override {}
+  void OnSequenceStart(const YAML::Mark&, Text, YAML::anchor_t, Style) override {}
   void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark&,
-                  const std::string&,
-                  YAML::anchor_t,
-                  YAML::EmitterStyle::value) override {}
+  void OnMapStart(const YAML::Mark&, Text, YAML::anchor_t, Style) override {}
   void OnMapEnd() override {}
 };
 
@@ -146,6 +140,11 @@ Expected<YAML::Node> parse_document(const std::string& text, std::string_view so
   }
 }
 
+Expected<YAML::Node> read_document(const std::filesystem::path& file) {
+  STEMVO_TRY_GET(const std::string text, read_text_file(file, kMaxSettings_MB));
+  return parse_document(text, file.string());
+}
+
 std::string parse(const YAML::Node& node, std::string& value) {
   if (!node.IsScalar()) {
     return fmt::format("expected one value, found {}", kind_of(node));
@@ -169,16 +168,12 @@ std::string parse(const YAML::Node& node, N& value) {
   if (std::string problem = parse(node, text); !problem.empty()) {
     return problem;
   }
-  // The whole text or nothing; a leading '+' is allowed as in YAML.
-  const bool has_plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
-  const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data() + (has_plus ? 1 : 0), end, value);
+  const std::optional<N> number = to_number<N>(text);
+  value = number.value_or(N{});
   const char* kind = std::is_floating_point_v<N> ? "a number"
                      : std::is_unsigned_v<N>     ? "a whole number of at least 0"
                                                  : "a whole number";
-  return error == std::errc() && stop == end
-             ? std::string()
-             : fmt::format("expected {}, found '{}'", kind, one_line(text));
+  return number ? "" : fmt::format("expected {}, found '{}'", kind, one_line(text));
 }
 template std::string parse(const YAML::Node&, int&);
 template std::string parse(const YAML::Node&, double&);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <concepts>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -18,6 +19,8 @@ namespace stemvo::config {
 
 /// The one document of a YAML text. Errors "<source>:<line>: ...": not YAML, several documents.
 [[nodiscard]] Expected<YAML::Node> parse_document(const std::string& text, std::string_view source);
+/// The same of a file. Error: it cannot be read, too.
+[[nodiscard]] Expected<YAML::Node> read_document(const std::filesystem::path& file);
 
 /// Read a value, numbers in decimal ("010" is ten). Nothing, or "expected ..., found ...". A list
 /// may also stand in a text, as --set gives it.

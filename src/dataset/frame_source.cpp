@@ -91,8 +91,8 @@ Expected<FrameRangeRequest> parse_frame_range(const std::string& text) {
   const std::size_t colon = std::min(text.find(':'), text.size());
   const std::string first = text.substr(0, colon);
   const std::string last = text.substr(std::min(colon + 1, text.size()));
-  const std::optional<std::size_t> begin = first.empty() ? 0 : parse_index(first);
-  const std::optional<std::size_t> end = parse_index(last);
+  const std::optional<std::size_t> begin = first.empty() ? 0 : to_number<std::size_t>(first);
+  const std::optional<std::size_t> end = to_number<std::size_t>(last);
   if (colon == text.size() || text == ":" || !begin || (!last.empty() && !end)) {
     return fail(fmt::format("expected A:B, A: or :B with whole numbers, found '{}'", text));
   }
@@ -142,7 +142,7 @@ std::optional<int> dataset::camera_number(const fs::path& path) {
   if (!text.starts_with(kPrefix)) {
     return std::nullopt;
   }
-  const auto number = parse_index(std::string_view(text).substr(kPrefix.size()));
+  const auto number = to_number<std::size_t>(std::string_view(text).substr(kPrefix.size()));
   return number && *number < kMaxNumber ? std::optional(static_cast<int>(*number)) : std::nullopt;
 }
 

@@ -155,7 +155,7 @@ Expected<std::vector<fs::path>> list_images(const fs::path& folder) {
   std::vector<std::pair<std::size_t, fs::path>> numbered;
   for (const fs::path& file : found) {
     const std::string stem = file.stem().string();
-    const auto number = parse_index(stem);
+    const auto number = to_number<std::size_t>(stem);
     if (number && stem.size() >= kDigits && file.extension() == ".png") {
       numbered.emplace_back(*number, file);
     }

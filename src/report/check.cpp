@@ -55,19 +55,13 @@ void add_bounds(const std::filesystem::path& file,
 }
 
 Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::path& file) {
-  const Expected<YAML::Node> root =
-      read_text_file(file, kMaxSettings_MB).and_then([&](const std::string& text) {
-        return config::parse_document(text, file.string());
-      });
-  if (!root) {
-    return fail(root.error().message.substr(0, root.error().message.find('\n')));
-  }
-  if (!root->IsMap() || root->size() == 0) {
+  STEMVO_TRY_GET(const YAML::Node root, config::read_document(file));
+  if (!root.IsMap() || root.size() == 0) {
     return fail(fmt::format("{}: expected lines like 't_rel_percent: {{max: 1.0}}', found none",
                             file.string()));
   }
   std::vector<ThresholdResult> bounds;
-  for (const auto& entry : *root) {
+  for (const auto& entry : root) {
     add_bounds(file, entry.first, entry.second, bounds);
   }
   return bounds;
@@ -200,8 +194,10 @@ std::string format_check_table(const std::vector<ThresholdResult>& results) {
   TextTable table("lrll");
   table.add({"metric", "value", "bound", "result"});
   table.rule();
+  std::string problems;
   for (const ThresholdResult& result : results) {
     const bool has_problem = !result.problem.empty();
+    problems += has_problem ? result.problem + "\n" : "";
     table.add({result.key, has_problem ? "-" : shown(result), has_problem ? "-" : bound_of(result),
                result.passed ? "ok" : "FAILED"});
   }
@@ -209,10 +205,6 @@ std::string format_check_table(const std::vector<ThresholdResult>& results) {
   const std::string summary =
       failed == 0 ? fmt::format("all {} bounds kept\n", results.size())
                   : fmt::format("{} of {} bounds not kept\n", failed, results.size());
-  std::string problems;
-  for (const ThresholdResult& result : results) {
-    problems += result.problem.empty() ? "" : result.problem + "\n";
-  }
   return table.str() + summary + problems;
 }
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -11,23 +10,13 @@
 
 #include <fmt/core.h>
 
+#include "geometry/median.hpp"
 #include "try.hpp"
 
 namespace stemvo {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Nullopt: not a number of size up to 1e20, or not all of the word. Squares and sums stay finite.
-std::optional<double> to_number(std::string_view word) {
-  constexpr double kLargest = 1e20;
-  const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
-  double number = 0.0;
-  const auto [end, error] = std::from_chars(digits.begin(), digits.end(), number);
-  const bool is_good =
-      error == std::errc() && end == digits.end() && std::abs(number) <= kLargest;  // nan is not
-  return is_good ? std::optional(number) : std::nullopt;
-}
 
 Error cannot(std::string_view verb, const fs::path& file, int reason) {
   return fail(fmt::format("{}: cannot {}: {}{}", file.string(), verb,
@@ -197,9 +186,7 @@ double usual_step(const std::vector<TimedRow>& rows) {
   for (std::size_t i = 1; i < rows.size(); ++i) {
     steps.push_back(rows[i].time_s - rows[i - 1].time_s);
   }
-  const auto middle = steps.begin() + std::ssize(steps) / 2;
-  std::ranges::nth_element(steps, middle);
-  return steps.empty() ? 0.0 : *middle;
+  return median(std::move(steps));
 }
 
 /// Lengths of time in one unit differ by less: half the way to the next unit.
@@ -237,26 +224,25 @@ Expected<Unit> find_unit(const std::vector<TimedRow>& rows, const UsualTimes& us
   }
   const bool may_be_rare = step <= 600.0 && is_since_1970(kUnits[0]);  // photos, 10 minutes apart
   std::vector<Unit> usual_units;
-  std::optional<Unit> of_span;
   for (const Unit& unit : kUnits) {
     const bool is_long = unit.size_s == 1.0 || step * unit.size_s >= usual.min_step_s;
-    if (is_long && usual.span_s && !of_span &&
+    if (is_long && usual.span_s &&
         is_of_span(first * unit.size_s, last * unit.size_s, *usual.span_s)) {
-      of_span = unit;
+      return unit;
     }
     const bool is_usual = is_short(unit) || (unit.size_s == 1.0 && may_be_rare);
     if (is_long && is_usual && covers_frames(unit)) {
       usual_units.push_back(unit);
     }
   }
-  if (!of_span && usual_units.size() > 1) {
+  if (usual_units.size() > 1) {
     return fail(fmt::format("expected times in seconds, found steps of {}, {} or {}", step,
                             usual_units[0].name, usual_units[1].name));
   }
   if (usual_units.empty()) {
-    usual_units.push_back(usual.span_s ? kUnits[0] : std::end(kUnits)[-1]);
+    return usual.span_s ? kUnits[0] : std::end(kUnits)[-1];
   }
-  return of_span.value_or(usual_units[0]);
+  return usual_units[0];
 }
 
 }  // namespace
@@ -311,17 +297,12 @@ Expected<TimedRows<TimedRow>> read_timed_rows(const fs::path& file,
   return result;
 }
 
-std::optional<std::size_t> parse_index(std::string_view text) {
-  std::size_t index = 0;
-  const auto [end, error] = std::from_chars(text.begin(), text.end(), index);
-  return error == std::errc() && end == text.end() ? std::optional(index) : std::nullopt;
-}
-
 Expected<std::vector<double>> parse_numbers(std::string_view line, std::size_t count) {
+  constexpr double kLargest = 1e20;  // squares and sums stay finite
   std::vector<double> numbers;
   for (const std::string_view word : split_words(line)) {
-    const std::optional<double> number = to_number(word);
-    if (!number) {
+    const auto number = to_number<double>(word);
+    if (!number || !(std::abs(*number) <= kLargest)) {
       return fail(fmt::format("expected a finite number, found '{}'",
                               word.substr(0, 40)));  // a binary file has long words
     }

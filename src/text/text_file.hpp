@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <charconv>
 #include <cstddef>
 #include <filesystem>
 #include <initializer_list>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -98,8 +100,16 @@ struct UsualTimes {
     const UsualTimes& usual = {},
     double unit_s = 1.0);
 
-/// Decimal digits alone; nullopt: another text, or too large.
-[[nodiscard]] std::optional<std::size_t> parse_index(std::string_view text);
+/// A decimal number that is all of the word, whatever the locale; '+' may stand before its digits.
+/// Nullopt: another text, or too large.
+template <typename Number>
+[[nodiscard]] std::optional<Number> to_number(std::string_view word) {
+  const bool has_plus = word.starts_with('+') && !word.starts_with("+-");
+  Number number{};
+  const char* const end = word.data() + word.size();
+  const auto [stop, error] = std::from_chars(word.data() + (has_plus ? 1 : 0), end, number);
+  return error == std::errc() && stop == end ? std::optional(number) : std::nullopt;
+}
 /// Exactly `count` numbers of size up to 1e20, whatever the locale. The error says what was
 /// expected and found, without file and line: "expected 12 numbers, found 11".
 [[nodiscard]] Expected<std::vector<double>> parse_numbers(std::string_view line, std::size_t count);
