@@ -5,6 +5,7 @@
 #include <iterator>
 #include <limits>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <opencv2/calib3d.hpp>
@@ -81,17 +82,11 @@ cv::Vec3d normal_of(const BoardView& view) {
 
 /// The largest angle between two of the boards' normals, about: rad.
 double spread_of_tilts(const std::vector<BoardView*>& views) {
-  const cv::Vec3d least(-1.0, -1.0, -1.0);
-  cv::Vec3d low = -least;
-  cv::Vec3d high = least;
+  Eigen::AlignedBox3d box;
   for (const BoardView* view : views) {
-    const cv::Vec3d normal = normal_of(*view);
-    for (int i = 0; i < 3; ++i) {
-      low[i] = std::min(low[i], normal[i]);
-      high[i] = std::max(high[i], normal[i]);
-    }
+    box.extend(Eigen::Vector3d(normal_of(*view).val));
   }
-  return cv::norm(high - low);
+  return box.diagonal().norm();
 }
 
 /// No camera sees a board that was named wrong; boards that are all parallel tell none, whatever

@@ -35,10 +35,6 @@ constexpr double kMaxSigmaOfDistortion = 0.05;
 /// Fewer keyframes do not tell a camera.
 constexpr std::size_t kMinKeyframes = 8;
 
-fs::path calibration_file(const CalibrationRequest& request, const FrameSource& sequence) {
-  return sequence.given_calibration.value_or(request.sequence_dir / "calib.txt");
-}
-
 Expected<KeptMap> drive(const CalibrationRequest& request,
                         const FrameSource& sequence,
                         const RunProgress& progress,
@@ -197,8 +193,8 @@ Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request
   if (std::any_of(report.parameters.begin(), report.parameters.begin() + 3,
                   std::mem_fn(&CalibratedParameter::is_determined))) {
     const auto write = report.is_kitti ? write_kitti : write_camera;
-    STEMVO_TRY(
-        write(calibration_file(request, sequence), sequence.camera, request.out_file, report));
+    const fs::path from = sequence.given_calibration.value_or(request.sequence_dir / "calib.txt");
+    STEMVO_TRY(write(from, sequence.camera, request.out_file, report));
     report.written = true;
   }
   return report;
