@@ -118,18 +118,16 @@ void add_row(TextTable& table, const EvaluationRow& row, Alignment alignment) {
              texts[kAteText + static_cast<std::size_t>(alignment)], texts[8], texts[9]});
 }
 
-nlohmann::ordered_json row_json(const EvaluationRow& row) {
-  nlohmann::ordered_json json;
-  json["file"] = row.name;
-  json["compared_poses"] = row.num_pairs;
+}  // namespace
+
+// Found by nlohmann's library.
+void to_json(nlohmann::ordered_json& json, const EvaluationRow& row) {
+  json = {{"file", row.name}, {"compared_poses", row.num_pairs}};
   add_metrics(json, row.metrics);
   if (row.doubt) {
     json["warning"] = *row.doubt;
   }
-  return json;
 }
-
-}  // namespace
 
 Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
   STEMVO_TRY_GET(auto truth, dataset::read_truth(request.ground_truth, request.camera_file));
@@ -204,16 +202,11 @@ std::string format_evaluation_table(const EvaluationReport& report) {
 }
 
 nlohmann::ordered_json evaluation_document(const EvaluationReport& report) {
-  nlohmann::ordered_json json;
-  json["ground_truth"] = report.ground_truth;
-  json["poses"] = report.num_poses;
-  json["alignment"] = to_string(report.alignment);
-  json["estimates"] = nlohmann::ordered_json::array();
-  for (const EvaluationRow& row : report.rows) {
-    json["estimates"].push_back(row_json(row));
-  }
-  json["zero_motion"] = row_json(report.zero_motion);
-  return json;
+  return {{"ground_truth", report.ground_truth},
+          {"poses", report.num_poses},
+          {"alignment", to_string(report.alignment)},
+          {"estimates", report.rows},
+          {"zero_motion", report.zero_motion}};
 }
 
 Expected<Alignment> parse_alignment(const std::string& text) {
