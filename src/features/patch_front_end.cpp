@@ -221,11 +221,14 @@ class PatchFrontEnd final : public PointFrontEnd {
       return is_turned ? outlook.turned(from.points[i].uv, motion) : outlook.on(motion);
     };
     find_known(from, tracks, align, known_motion, predicted, found);
-    for (std::size_t i = 0; i < found.size(); ++i) {
+    const auto add_motion = [&](std::size_t i) {
       if (is_found(found[i])) {
         const cv::Point2f& uv = from.points[i].uv;
         motions.add(uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - uv);
       }
+    };
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      add_motion(i);
     }
     std::vector<std::optional<cv::Point2f>> result(found.size());
     for (std::size_t i = 0; i < found.size(); ++i) {
@@ -246,9 +249,7 @@ class PatchFrontEnd final : public PointFrontEnd {
       Track& track = *tracks[i];
       if (is_far && !is_found(found[i])) {
         found[i] = align(i, near(point.uv), coarsest);
-        if (is_found(found[i])) {
-          motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
-        }
+        add_motion(i);
       }
       if (accept(found[i], image, to.frame, point, track)) {
         result[i] = cv::Point2f(track.warp.x, track.warp.y);

@@ -212,7 +212,6 @@ RoadCurve::RoadCurve(const Path& path, std::vector<RoadPart> parts) : parts_(std
     if (part.shift > 0) {
       std::copy(knots_.begin() + (part.begin - part.shift),
                 knots_.begin() + (part.end - part.shift), knots_.begin() + part.begin);
-      forks_.push_back({part.end - part.shift, part.end});
     }
   }
 }

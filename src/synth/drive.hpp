@@ -47,12 +47,6 @@ struct RoadPart {
   int shift;
 };
 
-/// Two knots at one place: there the road leaves an earlier part of itself, which goes on.
-struct Fork {
-  int earlier;
-  int later;
-};
-
 /// A polyline with an up direction at each point.
 struct Path {
   std::vector<Vec3> points;
@@ -80,7 +74,6 @@ class RoadCurve {
     return *std::ranges::upper_bound(parts_, knot, {}, &RoadPart::end);
   }
   [[nodiscard]] int home(int knot) const { return knot - part_of(knot).shift; }
-  [[nodiscard]] const std::vector<Fork>& forks() const { return forks_; }
   /// Whether a thing of the street at `knot`, so far from its middle, would stand on the road (from
   /// beyond the sidewalk: on it, too) that goes another way at a fork.
   [[nodiscard]] bool is_in_the_way(int knot, double lateral_m, const Vec3& point) const;
@@ -90,7 +83,6 @@ class RoadCurve {
  private:
   std::vector<RoadFrame> knots_;
   std::vector<RoadPart> parts_;
-  std::vector<Fork> forks_;
 };
 
 /// The mean around each value, weighted by how far the others are from it. At the ends the window

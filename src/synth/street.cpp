@@ -40,8 +40,9 @@ struct Street {
       return begin_m < middle + kCrossingHalf_m && end_m > middle - kCrossingHalf_m;
     });
   }
-  [[nodiscard]] bool is_crossed(int knot) const { return is_crossed(home(knot), home(knot) + 1); }
-  [[nodiscard]] int home(int knot) const { return road.home(knot); }
+  [[nodiscard]] bool is_crossed(int knot) const {
+    return is_crossed(road.home(knot), road.home(knot) + 1);
+  }
   /// Coordinates of the road's texture, near 0 around the camera.
   [[nodiscard]] double u_m(int knot) const {
     const auto& [begin, end, shift] = road.part_of(knot);
@@ -164,7 +165,7 @@ void add_borders(const Street& street) {
       if (street.is_crossed(i) || street.road.is_in_the_way(i, lateral_m, middle)) {
         continue;
       }
-      Draw draw(street.seed, 'B', side > 0.0, street.home(i) / 16);
+      Draw draw(street.seed, 'B', side > 0.0, street.road.home(i) / 16);
       const std::uint32_t seed = draw.bits();
       const double share = draw.next();
       Style style = share < 0.6 ? kHedge : share < 0.8 ? kWall : kFence;
@@ -301,29 +302,6 @@ void add_poles(const Street& street) {
   });
 }
 
-void add_part(const Street& street) {
-  add_ground(street);
-  add_borders(street);
-  street.for_each_lot('H', kLot_m, std::bind_front(add_building, std::cref(street)));
-  add_plants(street);
-  add_poles(street);
-  street.for_each_slot(6.5, [&](int slot, double slot_m) {
-    constexpr double kParked_m = 3.35;  // at the kerb on the right
-    Draw draw(street.seed, 'C', slot);
-    auto place = street.roomy(slot_m + draw.in(0.5, 1.4), kParked_m, 0.95);
-    if (place && draw.chance(0.3)) {
-      place->position = place->point(kParked_m, 0.0);
-      add_car(*place, draw, false, street.scene, true);
-    }
-  });
-  for (int i = street.window.start; i < street.window.end; ++i) {
-    if (std::ranges::find(street.crossings, street.home(i)) != street.crossings.end()) {
-      add_side_streets(street.road.knot(i), hash_of(street.seed, 'Q', street.home(i)),
-                       street.scene);
-    }
-  }
-}
-
 }  // namespace
 
 void add_street(const RoadCurve& road,
@@ -332,7 +310,26 @@ void add_street(const RoadCurve& road,
                 Scene& scene,
                 const std::vector<int>& crossings) {
   for (const cv::Range& way : ways_in_view(road, arc_m)) {
-    add_part({road, arc_m, way, seed, crossings, scene});
+    const Street street{road, arc_m, way, seed, crossings, scene};
+    add_ground(street);
+    add_borders(street);
+    street.for_each_lot('H', kLot_m, std::bind_front(add_building, std::cref(street)));
+    add_plants(street);
+    add_poles(street);
+    street.for_each_slot(6.5, [&](int slot, double slot_m) {
+      constexpr double kParked_m = 3.35;  // at the kerb on the right
+      Draw draw(street.seed, 'C', slot);
+      auto place = street.roomy(slot_m + draw.in(0.5, 1.4), kParked_m, 0.95);
+      if (place && draw.chance(0.3)) {
+        place->position = place->point(kParked_m, 0.0);
+        add_car(*place, draw, false, street.scene, true);
+      }
+    });
+    for (int i = street.window.start; i < street.window.end; ++i) {
+      if (std::ranges::find(crossings, road.home(i)) != crossings.end()) {
+        add_side_streets(road.knot(i), hash_of(seed, 'Q', road.home(i)), scene);
+      }
+    }
   }
 }
 

@@ -41,17 +41,44 @@ cv::Range visible_window(const RoadCurve& road, double arc_m) {
   return {last_clear_knot(road, last, here, -1, kSeenBehind_m), last + 1};
 }
 
-/// What else is seen of the road: where it forks in the window, the way that the camera's does not
-/// take, until it comes near the window again.
-std::vector<cv::Range> other_ways(const RoadCurve& road, const cv::Range& window, double arc_m) {
-  std::vector<cv::Range> ways;
+}  // namespace
+
+bool RoadCurve::is_in_the_way(int knot, double lateral_m, const Vec3& point) const {
+  constexpr int kBefore = 40;   // knots: a house there may reach so far
+  constexpr int kBehind = 120;  // by then the roads are apart
+  const bool is_beyond_sidewalk = lateral_m < -6.7 || lateral_m > 6.7;
+  const double left_m = is_beyond_sidewalk ? -7.2 : -5.1;
+  const double right_m = is_beyond_sidewalk ? 6.6 : 2.1;
+  return std::ranges::any_of(parts_, [&](const RoadPart& visit) {
+    const int earlier = visit.end - visit.shift;
+    const bool is_later = knot >= visit.end && knot < visit.end + kBehind;
+    const int on_earlier = home(knot) - earlier;
+    if (visit.shift == 0 || (!is_later && (on_earlier < -kBefore || on_earlier >= kBehind))) {
+      return false;
+    }
+    const int begin = is_later ? earlier : visit.end;
+    const int end = std::min(begin + kBehind, num_knots());
+    return std::any_of(knots_.begin() + begin, knots_.begin() + end, [&](const RoadFrame& other) {
+      const Vec3 off = point - other.position;
+      const double across_m = other.right.dot(off);
+      return std::abs(other.forward.dot(off)) < 0.8 && across_m > left_m && across_m < right_m;
+    });
+  });
+}
+
+/// Where the road forks in the window, the way that the camera's does not take is seen, too, until
+/// it comes near the window again.
+std::vector<cv::Range> ways_in_view(const RoadCurve& road, double arc_m) {
+  const cv::Range window = visible_window(road, arc_m);
+  std::vector<cv::Range> ways = {window};
   const auto in_window = std::views::iota(window.start, window.end);
-  for (const auto& [earlier, later] : road.forks()) {
+  for (const auto& [first, later, shift] : road.parts()) {
+    const int earlier = later - shift;
     const bool is_on_later = later >= window.start && later < window.end;
     const auto at = is_on_later ? std::ranges::find(in_window, later)
                                 : std::ranges::find(in_window, earlier,
                                                     [&](int knot) { return road.home(knot); });
-    if (at == in_window.end()) {
+    if (shift == 0 || at == in_window.end()) {
       continue;
     }
     const int begin = is_on_later ? earlier : later;
@@ -69,37 +96,6 @@ std::vector<cv::Range> other_ways(const RoadCurve& road, const cv::Range& window
     }
     ways.push_back(way);
   }
-  return ways;
-}
-
-}  // namespace
-
-bool RoadCurve::is_in_the_way(int knot, double lateral_m, const Vec3& point) const {
-  constexpr int kBefore = 40;   // knots: a house there may reach so far
-  constexpr int kBehind = 120;  // by then the roads are apart
-  const bool is_beyond_sidewalk = lateral_m < -6.7 || lateral_m > 6.7;
-  const double left_m = is_beyond_sidewalk ? -7.2 : -5.1;
-  const double right_m = is_beyond_sidewalk ? 6.6 : 2.1;
-  return std::ranges::any_of(forks_, [&](const Fork& fork) {
-    const bool is_later = knot >= fork.later && knot < fork.later + kBehind;
-    const int on_earlier = home(knot) - fork.earlier;
-    if (!is_later && (on_earlier < -kBefore || on_earlier >= kBehind)) {
-      return false;
-    }
-    const int begin = is_later ? fork.earlier : fork.later;
-    const int end = std::min(begin + kBehind, num_knots());
-    return std::any_of(knots_.begin() + begin, knots_.begin() + end, [&](const RoadFrame& other) {
-      const Vec3 off = point - other.position;
-      const double across_m = other.right.dot(off);
-      return std::abs(other.forward.dot(off)) < 0.8 && across_m > left_m && across_m < right_m;
-    });
-  });
-}
-
-std::vector<cv::Range> ways_in_view(const RoadCurve& road, double arc_m) {
-  const cv::Range window = visible_window(road, arc_m);
-  std::vector<cv::Range> ways = other_ways(road, window, arc_m);
-  ways.insert(ways.begin(), window);
   return ways;
 }
 
