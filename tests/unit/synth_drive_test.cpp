@@ -5,7 +5,6 @@
 
 #include "dataset/frame_source.hpp"
 #include "support/test.hpp"
-#include "synth/renderer.hpp"
 #include "synth/synth.hpp"
 
 namespace stemvo {
@@ -122,42 +121,6 @@ TEST_F(SyntheticDriveTest, RendersAnyGivenPoses) {
     std::memcpy(&z, depth.data() + depth.size() - 4U * 80U, sizeof(z));
     const double expected = 1.65 * 718.856 * 160 / 1241 / (47.0 - 185.2157 * 48 / 376);
     EXPECT_NEAR(static_cast<double>(z), expected, 0.12 * expected) << "frame " << i;
-  }
-}
-
-/// A street; around, back to it, and off to the left where it first went to the right.
-Trajectory forking_drive() {
-  constexpr double kStep_m = 4.0;
-  Trajectory poses;
-  double heading_rad = 0.0;
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();
-  const auto drive = [&](int steps, double turn_deg) {
-    for (int i = 0; i < steps; ++i) {
-      heading_rad += turn_deg / steps * std::numbers::pi / 180.0;
-      at += kStep_m * Eigen::Vector3d(std::sin(heading_rad), 0.0, std::cos(heading_rad));
-      poses.emplace_back(
-          Eigen::Quaterniond(Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitY())), at);
-    }
-  };
-  drive(25, 0.0);
-  drive(30, 180.0);
-  drive(40, 0.0);
-  drive(30, 180.0);
-  drive(40, 0.0);
-  drive(20, -60.0);
-  return poses;
-}
-
-TEST(GivenDrive, AForkIsTheSameOnBothWays) {
-  const Trajectory poses = forking_drive();
-  const Camera camera{92.0, 92.0, 79.5, 23.5, 160, 48};
-  const synth::Renderer renderer(synth::make_drive_along(poses), camera, 1);
-  constexpr std::size_t kAgain = 140;  // where frame 0 was
-  for (std::size_t first = 3; first < 25; first += 3) {
-    ASSERT_LT((poses[first].inverse() * poses[kAgain + first]).translation.norm(), 0.01);
-    const cv::Mat off_m =
-        cv::abs(renderer.render(first).depth_m - renderer.render(kAgain + first).depth_m);
-    EXPECT_LT(cv::countNonZero(off_m > 0.5), 0.03 * 160 * 48) << "frame " << first;
   }
 }
 
