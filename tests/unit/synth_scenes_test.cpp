@@ -52,6 +52,17 @@ std::set<std::array<long, 10>> faces_near(const Drive& drive, std::size_t frame,
   return faces;
 }
 
+/// Corners of faces in the way of a car, up to 8 m ahead.
+std::ptrdiff_t num_in_the_way(const Drive& drive, std::size_t frame) {
+  const Rigid3& camera = drive.world_from_camera[frame];
+  Scene scene{camera.translation, -Vec3::UnitY(), 0.5};
+  add_street(drive.road, drive.arcs_m[frame], 1, scene);
+  return std::ranges::count_if(scene.faces, [&](const Face& face) {
+    const Vec3 at = camera.rotation.conjugate() * face.points[0].cast<double>();
+    return std::abs(at.x()) < 1.2 && std::abs(at.y()) < 1.0 && at.z() > 0.0 && at.z() < 8.0;
+  });
+}
+
 TEST(Visit, DriveThatComesBackSeesTheSameStreet) {
   const Trajectory given = round_a_block();
   const Drive drive = make_drive_along(given);
@@ -78,6 +89,10 @@ TEST(Visit, DriveThatComesBackSeesTheSameStreet) {
     ++compared;
   }
   EXPECT_GE(compared, 10);
+  for (const std::size_t i : {640U, 650U, 660U, 670U, 680U, 690U, 700U}) {
+    EXPECT_EQ(num_in_the_way(drive, i), 0) << "frame " << i;
+    EXPECT_EQ(num_in_the_way(drive, i - 455), 0) << "frame " << i - 455;
+  }
   for (std::size_t i = 0; i < given.size(); ++i) {
     const Rigid3 moved = given[i].inverse() * drive.world_from_camera[i];
     EXPECT_LT(std::hypot(moved.translation.x(), moved.translation.z()), 1e-9) << i;
