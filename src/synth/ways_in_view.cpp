@@ -34,11 +34,11 @@ constexpr double kInView_m = 170.0;
 /// Nothing stands in the way of the street the camera is in: the window ends where the road comes
 /// back to itself.
 cv::Range visible_window(const RoadCurve& road, double arc_m) {
-  constexpr double kSeenBehind_m = 60.0;
+  constexpr double kSeenBack_m = 60.0;
   constexpr int kBeside = 30;  // what is ahead must not stand in the street just behind the camera
   const int here = std::clamp(static_cast<int>(arc_m), 0, road.num_knots() - 1);
   const int last = last_clear_knot(road, std::max(here - kBeside, 0), here, 1, kInView_m);
-  return {last_clear_knot(road, last, here, -1, kSeenBehind_m), last + 1};
+  return {last_clear_knot(road, last, here, -1, kSeenBack_m), last + 1};
 }
 
 }  // namespace
