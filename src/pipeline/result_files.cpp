@@ -176,11 +176,15 @@ class ResultWriter {
     if (request_.saved_map) {
       keep_first(written, run_.odometry.save_map(*request_.saved_map, map_->whole.kept));
     }
+    const auto is_own = [](const auto& loop) { return loop.second >= 0; };
+    const auto shows_given = [](const FrameResult& frame) { return frame.recognized_frame < -1; };
     report.map = {.num_keyframes = map_->whole.kept.keyframes.size(),
-                  .num_loops = frames_of_loops(map_->whole.kept).size(),
+                  .num_loops = static_cast<std::size_t>(
+                      std::ranges::count_if(frames_of_loops(map_->whole.kept), is_own)),
                   .num_relocalizations = count_relocalizations(drive_.frames),
                   .adjustment_s = map_->adjustment_s,
-                  .metrics = std::nullopt};
+                  .metrics = std::nullopt,
+                  .is_apart = request_.map && std::ranges::none_of(drive_.frames, shows_given)};
     if (truth_) {
       report.map->metrics = metrics_of(map_->trajectory, report);
     }

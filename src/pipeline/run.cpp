@@ -107,6 +107,11 @@ Expected<RunSummary> finish_run(const Run& run, const RunProgress& progress) {
   Status written = pipeline::write_results(run, done, report);
   add_line(done.warnings, warn_of_scale(report));
   add_line(done.warnings, warn_of_gaps(report));
+  if (report.map && report.map->is_apart) {
+    done.warnings.push_back(request.map->string() +
+                            ": no place of it was seen; trajectory_map_*.txt and map.ply have axes "
+                            "and a unit of their own");
+  }
   const auto late = run.beside.warnings(done.frames.front().time_s, done.frames.back().time_s);
   done.warnings.insert(done.warnings.end(), late.begin(), late.end());
   return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,

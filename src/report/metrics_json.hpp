@@ -39,6 +39,7 @@ struct MapReport {
   std::size_t num_relocalizations = 0;  ///< frames that found the camera again after a loss
   std::optional<double> adjustment_s;   ///< how long the adjustment of everything took
   std::optional<Metrics> metrics;       ///< of trajectory_map_kitti.txt
+  bool is_apart = false;                ///< from the map that was given: none of it was seen
 };
 
 /// The numbers of metrics.json. Everything in `metrics` is null in the file without ground truth.

@@ -30,11 +30,15 @@ TEST_F(SecondVisit, BeginsWhereItBegan) {
     const auto done = run_stemvo(
         {"run", clip, "--frames", frames, option, map, "--out", folder_ / "result", "--quiet"});
     EXPECT_EQ(done.exit_code, 0) << done.err;
+    EXPECT_THAT(done.err, Not(HasSubstr("no place of it")));
     return metrics_of(folder_ / "result").at("t_rel_percent").get<double>();
   };
   EXPECT_LT(t_rel_percent("--save-map", "0:51"), 1.0);
   EXPECT_LT(t_rel_percent("--map", "0:51"), 1.2) << "the steps until the place was recognized";
   EXPECT_LT(t_rel_percent("--map", "15:51"), 1.5);
+  const auto elsewhere = run_stemvo({"run", shared_data() / "kitti/sequences/00", "--frames",
+                                     "0:30", "--map", map, "--out", folder_ / "result", "--quiet"});
+  EXPECT_THAT(elsewhere.err, HasSubstr("place.map: no place of it was seen"));
 }
 
 class RoadOfClip : public NeedsClips {
