@@ -30,7 +30,7 @@ const IntrinsicsDelta kPriorSigma = (IntrinsicsDelta() << 30.0, 30.0, 0.2, 0.1, 
 /// A number less certain than this is not determined: px, and a share of the focal length. On a
 /// straight drive an estimate with a sigma of 1.5 px was 6 px off.
 constexpr double kMaxSigma_px = 1.25;
-constexpr double kMaxSigmaOfFocal = 0.01;
+constexpr double kMaxSigmaOfFocal = 0.015;
 constexpr double kMaxSigmaOfDistortion = 0.05;
 /// Fewer keyframes do not tell a camera.
 constexpr std::size_t kMinKeyframes = 8;

@@ -83,7 +83,7 @@ class Adjustment {
     result.camera.num_bundles = 1;
     read_landmarks(result);
     read_poses(result);
-    if (options_.camera_sigma || !options_.covariance_of.empty()) {
+    if (options_.has_sigmas && (options_.camera_sigma || !options_.covariance_of.empty())) {
       read_covariances(result);
     }
     return result;

@@ -26,6 +26,8 @@ struct MapAdjustmentOptions {
   /// longest tracks are taken: they tell a camera best. The path is told better, and ten times as
   /// fast, by pieces of any tracks.
   std::size_t max_views = 0;
+  /// False: neither the camera's nor the keyframes' are asked for. They take half of the memory.
+  bool has_sigmas = true;
 };
 
 /// A landmark, and who sees it.

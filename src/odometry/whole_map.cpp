@@ -61,7 +61,7 @@ void WholeMap::close_loops() {
   }
 }
 
-Status WholeMap::adjust(const std::vector<int>& frames) {
+Status WholeMap::adjust(const std::vector<int>& frames, bool has_sigmas) {
   for (const int frame : frames) {
     const auto found = std::ranges::lower_bound(kept.keyframes, frame, {}, &KeptKeyframe::frame);
     if (found == kept.keyframes.end() || found->frame != frame) {
@@ -73,8 +73,8 @@ Status WholeMap::adjust(const std::vector<int>& frames) {
   const auto is_of_other = [](const KeptKeyframe& keyframe) { return keyframe.frame < 0; };
   const auto num_of_other = std::ranges::count_if(kept.keyframes, is_of_other);
   constexpr std::size_t kMaxViews = 12;
-  const auto adjusted =
-      adjust_map(kept, {camera, prior, static_cast<int>(num_of_other), covariance_of, kMaxViews});
+  const auto adjusted = adjust_map(
+      kept, {camera, prior, static_cast<int>(num_of_other), covariance_of, kMaxViews, has_sigmas});
   if (adjusted && agrees_with_motions(kept, adjusted->map_from_keyframe)) {
     take_in(*adjusted);
   } else {
@@ -102,7 +102,7 @@ void WholeMap::take_in(const MapAdjustment& adjusted) {
   }
   const IntrinsicsDelta& change = adjusted.camera.change;
   camera = changed(camera, change);
-  camera_sigma = adjusted.camera.sigma;
+  camera_sigma = adjusted.camera.sigma;  // 0: nobody asked
   for (KeptKeyframe& keyframe : kept.keyframes) {
     if (keyframe.frame < 0) {
       continue;

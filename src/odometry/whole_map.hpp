@@ -26,7 +26,7 @@ struct WholeMap {
   void close_loops();
   /// Places keyframes and their landmarks where everything agrees best, and all frames among them.
   /// `covariance_of`: frames of keyframes. Error: one of them is none.
-  [[nodiscard]] Status adjust(const std::vector<int>& covariance_of = {});
+  [[nodiscard]] Status adjust(const std::vector<int>& covariance_of, bool has_sigmas = true);
   [[nodiscard]] AdjustedMap answer() const;
 
   KeptMap kept;

@@ -38,7 +38,7 @@ MapResult finish_map(const Run& run) {
   MapResult map{WholeMap(run.odometry), {}};
   if (run.request.adjust_map || !map.whole.kept.loops.empty()) {
     const auto start = std::chrono::steady_clock::now();
-    (void)map.whole.adjust();  // no covariances: no error
+    (void)map.whole.adjust({}, false);  // no covariances: no error
     map.adjustment_s =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   } else {
