@@ -267,18 +267,23 @@ class PatchFrontEnd final : public PointFrontEnd {
                          int level,
                          std::vector<PatchMatch>& found) {
     const auto is_known = [&](const Track* track) { return track->frame == from.frame; };
-    const auto look = [&](int first_level, float least) {
-      for (std::size_t i = 0; i < found.size(); ++i) {
-        if (is_known(tracks[i]) && !is_found(found[i])) {
+    const auto look = [&](int first_level, float least, std::vector<PatchMatch>& matches) {
+      for (std::size_t i = 0; i < matches.size(); ++i) {
+        if (is_known(tracks[i]) && !is_found(matches[i])) {
           const PatchMatch match = align(i, motion(i), first_level);
-          found[i] = match.correlation >= least ? match : found[i];
+          matches[i] = match.correlation >= least ? match : matches[i];
         }
       }
     };
-    look(level, kMinCorrelation);
-    const auto num_known = static_cast<double>(std::ranges::count_if(tracks, is_known));
-    if (static_cast<double>(std::ranges::count_if(found, is_found)) < kMostFound * num_known) {
-      look(0, kFoundAlone);
+    const auto has_most = [&](const std::vector<PatchMatch>& matches) {
+      return static_cast<double>(std::ranges::count_if(matches, is_found)) >=
+             kMostFound * static_cast<double>(std::ranges::count_if(tracks, is_known));
+    };
+    look(level, kMinCorrelation, found);
+    if (!has_most(found)) {
+      std::vector<PatchMatch> alone = found;
+      look(0, kFoundAlone, alone);
+      found = has_most(alone) ? alone : found;  // else they have moved otherwise
     }
   }
 
