@@ -215,8 +215,9 @@ class Adjustment {
 
   template <int kSize, typename Error>
   void add(const Error& error, int from, int to, ceres::LossFunction* loss = nullptr) {
-    problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<Error, kSize, 6, 6>(new Error(error)),
-                              loss, poses_[slot(from)].delta.data(), poses_[slot(to)].delta.data());
+    residuals_.push_back({problem_.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<Error, kSize, 6, 6>(new Error(error)), loss,
+        poses_[slot(from)].delta.data(), poses_[slot(to)].delta.data())});
   }
 
   [[nodiscard]] int num_common_landmarks(const MapEdge& edge) const {
