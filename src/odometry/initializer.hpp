@@ -47,6 +47,11 @@ class Initializer {
   [[nodiscard]] std::optional<Window> open_window(const View& now,
                                                   const Camera& camera,
                                                   const WindowOptions& window_options) const;
+  /// Covariance, as MeasuredMotion::covariance, of what points that agree do not tell of the motion
+  /// that opened it.
+  [[nodiscard]] Matrix6d opening_error(const MeasuredMotion& motion,
+                                       const Observations& now,
+                                       const Camera& camera) const;
 
   /// The motion of the camera, of things that move on their own told apart.
   [[nodiscard]] MeasuredMotion measure_world(const PixelPairs& pairs, const Camera& camera) const;

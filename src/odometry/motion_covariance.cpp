@@ -27,10 +27,6 @@ constexpr double kSpread = 5.0;
 /// bend alike in turns to one side (measured on rendered drives, self_calibration.cpp).
 constexpr double kBend_px = 0.65;
 
-/// The length of the step that opens a map differs so much from the later ones' unit (rms over
-/// openings on the clips 0.03, the worst 0.14).
-constexpr double kOpening = 0.05;
-
 Matrix6d square(const Vector6d& value) { return value * value.transpose(); }
 
 Matrix6d transformed(const Matrix6d& covariance, const Matrix6d& by) {
@@ -82,8 +78,7 @@ Matrix6d two_view_motion(const MotionCovariance::Motion& motion) {
   if (motion.state == FrameState::kTracking || opens_map) {
     Vector6d scale;
     scale << Eigen::Vector3d::Constant(length), Eigen::Vector3d::Ones();
-    return scale.asDiagonal() * pair * scale.asDiagonal() +
-           diagonal(opens_map ? kOpening * length : 0.0, 0.0);
+    return scale.asDiagonal() * pair * scale.asDiagonal();
   }
   Matrix6d unknown = diagonal(std::max(length, motion.usual_step),
                               motion.hidden_px / motion.camera.mean_focal_px());

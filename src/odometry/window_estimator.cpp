@@ -251,7 +251,11 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
     moving_.add(frame.matches, motion.moving_mask);
     stood_ = false;
     is_initializing_ = false;
-    return told ? FrameState::kTracking : FrameState::kInitializing;
+    if (told) {
+      return FrameState::kTracking;
+    }
+    *localized.two_view += initializer_.opening_error(motion, view_.points, camera());
+    return FrameState::kInitializing;
   }
   // Until there is a first map, the position is held; later the camera goes on as it was seen to.
   const bool is_still = motion.state == FrameState::kStationary ||

@@ -80,6 +80,25 @@ TEST_P(MotionCovariance, IsHonestOnRenderedDrivesWithNoiseInTheImages) {
   }
 }
 
+/// Two views of a street whose third keeps its distance turn by a tenth of a degree too much.
+TEST(MotionCovarianceInTraffic, TheStepThatOpensAMapIsNoSurerThanItIsRight) {
+  for (const char* seed : {"3", "6", "9"}) {
+    SCOPED_TRACE(seed);
+    const fs::path drive = render_once(std::string("covariance_traffic_") + seed,
+                                       {"--traffic", "--frames", "3", "--seed", seed, "--width",
+                                        "800", "--height", "242", "--small-chip"});
+    const Trajectory truth = *read_kitti_trajectory(drive / "poses" / "00.txt");
+    const FrameResult opening = results_of(drive, 0.0).at(1);
+    ASSERT_EQ(opening.state, FrameState::kInitializing);
+    const Eigen::Matrix3d turn = (truth[0].inverse() * truth[1]).rotation_matrix();
+    const Eigen::Vector3d error =
+        so3_log(opening.world_from_camera.rotation.conjugate() * Eigen::Quaterniond(turn));
+    const Eigen::Vector3d sigma = opening.motion_covariance.diagonal().tail<3>().cwiseSqrt();
+    EXPECT_LT(error.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 3.0);  // 17, 17 and 24 by tracks
+    EXPECT_LT(sigma.maxCoeff(), 0.005);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Drives,
                          MotionCovariance,
                          ::testing::Values("street", "turn", "walk", "courtyard"),
