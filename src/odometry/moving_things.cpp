@@ -44,6 +44,9 @@ struct Cells {
 
 /// A party of fewer of the image's cells is noise, or too small to mislead.
 constexpr double kMinParty = 0.15;
+/// Bound of the plane, of that which counts elsewhere: far points of the world that move nearly as
+/// the thing does are the ones that tell the world's turn.
+constexpr double kOnPlane = 0.5;
 /// A motion explains matches where so many of their votes agree.
 constexpr double kExplains = 0.75;
 /// Depth counts so many times.
@@ -112,7 +115,7 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
     return std::nullopt;
   }
   const std::vector<char> plane =
-      score_homography(*all.homography, pairs, options.sigma_px).inlier_mask;
+      score_homography(*all.homography, pairs, kOnPlane * options.sigma_px).inlier_mask;
   const std::vector<char> rest = without(plane, std::vector<char>(plane.size(), 1));
   const auto votes = [&](const std::vector<char>& agrees) {
     return cell_votes(pairs.cur_uv, agrees);

@@ -70,6 +70,40 @@ TEST(MovingThings, ThePathIsTheWorldsFromTheFirstFrameOn) {
   }
 }
 
+TEST(MovingThings, FarPointsThatMoveNearlyAsAThingDoesAreTheWorlds) {
+  const Camera camera = street(2, 3).camera;
+  const Rigid3 cur_from_prev(so3_exp({0.0, 2.5 / camera.fx_px, 0.0}), {0.0, 0.0, -0.8});
+  constexpr int kNumFar = 60;
+  constexpr int kNumOfThing = 150;
+  SceneRandom random(4);
+  std::vector<Eigen::Vector2d> prev;
+  std::vector<Eigen::Vector2d> cur;
+  const auto add = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+    prev.push_back(from + random.noise(0.1));
+    cur.push_back(to + random.noise(0.1));
+  };
+  for (int i = 0; i < 130; ++i) {
+    const double side = (i % 2 == 0 ? 0.0 : 0.67) + random.uniform(0.0, 0.33);
+    const Eigen::Vector2d uv(side * camera.width_px, random.uniform(5.0, 370.0));
+    const double depth = i < kNumFar ? random.uniform(150.0, 400.0) : random.uniform(6.0, 30.0);
+    add(uv, camera.project(cur_from_prev * (depth * camera.normalize(uv).homogeneous())));
+  }
+  for (int i = 0; i < kNumOfThing; ++i) {
+    const Eigen::Vector2d uv(random.uniform(0.34, 0.66) * camera.width_px,
+                             random.uniform(5.0, 370.0));
+    add(uv, uv + Eigen::Vector2d(5.0, 0.0));
+  }
+  const MeasuredMotion world =
+      Initializer(config_without_scale()).measure_world({prev, cur}, camera);
+  // All of them, were a thing's points those within the bound of everything else.
+  EXPECT_LT(std::count(world.moving_mask.begin(), world.moving_mask.begin() + kNumFar, char{1}),
+            kNumFar * 2 / 3);
+  EXPECT_GT(std::count(world.moving_mask.end() - kNumOfThing, world.moving_mask.end(), char{1}),
+            140);
+  const double off_rad = world.cur_from_prev.rotation.angularDistance(cur_from_prev.rotation);
+  EXPECT_LT(camera.fx_px * off_rad, 0.5);
+}
+
 /// A road that turns by so much a frame from frame 20 on, behind a lorry that came at frame 8.
 void expect_true_path_behind_lorry(double turn_rad) {
   std::vector<Rigid3> path(1);
