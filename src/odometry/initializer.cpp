@@ -18,8 +18,8 @@ constexpr double kMinLiving = 0.3;
 constexpr int kMinLandmarks = 25;
 
 /// The step that opens a map differs so much from the later ones' unit (rms over openings on the
-/// clips 0.03, the worst 0.14), and in direction, where things move among the points; a turn makes
-/// up for that share of the parallax.
+/// clips 0.03, the worst 0.14), and in direction, where things move among the points (rendered
+/// traffic: up to 0.04); a turn makes up for that share of the parallax.
 constexpr double kOpening = 0.05;
 
 /// Hypotheses with fewer than this share of the most good points are out.

@@ -90,9 +90,8 @@ TEST(MotionCovarianceInTraffic, TheStepThatOpensAMapIsNoSurerThanItIsRight) {
     const Trajectory truth = *read_kitti_trajectory(drive / "poses" / "00.txt");
     const FrameResult opening = results_of(drive, 0.0).at(1);
     ASSERT_EQ(opening.state, FrameState::kInitializing);
-    const Eigen::Matrix3d turn = (truth[0].inverse() * truth[1]).rotation_matrix();
     const Eigen::Vector3d error =
-        so3_log(opening.world_from_camera.rotation.conjugate() * Eigen::Quaterniond(turn));
+        so3_log(opening.world_from_camera.rotation.conjugate() * motion_to(truth, 1).rotation);
     const Eigen::Vector3d sigma = opening.motion_covariance.diagonal().tail<3>().cwiseSqrt();
     EXPECT_LT(error.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 3.0);  // 17, 17 and 24 by tracks
     EXPECT_LT(sigma.maxCoeff(), 0.005);
