@@ -10,7 +10,7 @@
 
 #include "arrays.hpp"
 #include "features/front_end.hpp"
-#include "features/patch_alignment.hpp"
+#include "features/patch_pyramid.hpp"
 #include "features/point_front_end.hpp"
 #include "options.hpp"
 #include "stem/stem.hpp"
@@ -21,14 +21,6 @@ namespace {
 using namespace nb::literals;
 using Image = std::shared_ptr<const ImagePyramid>;
 using Points = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
-
-std::vector<BorderedImage> bordered(const ImagePyramid& image) {
-  std::vector<BorderedImage> levels;
-  for (const cv::Mat& level : image.levels) {
-    levels.push_back({level.data, static_cast<std::ptrdiff_t>(level.step), level.cols, level.rows});
-  }
-  return levels;
-}
 
 DoubleArray rows(const std::vector<double>& numbers, std::size_t columns) {
   auto data = std::make_unique<double[]>(numbers.size());
@@ -78,8 +70,8 @@ class PatchTracker {
     if (points.shape(0) != starts.shape(0)) {
       throw nb::value_error("starts: expected one for each point");
     }
-    const std::vector<BorderedImage> old_levels = bordered(from);
-    const std::vector<BorderedImage> new_levels = bordered(to);
+    const Pyramid old_levels = static_cast<const PatchPyramid&>(from).bordered;
+    const Pyramid new_levels = static_cast<const PatchPyramid&>(to).bordered;
     std::vector<double> found;
     for (std::size_t i = 0; i < points.shape(0); ++i) {
       const Eigen::Vector2f at =

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -13,7 +15,7 @@ namespace {
 
 constexpr int kCoarseIterations = 12;
 constexpr float kCoarseConverged_px = 0.1F;
-constexpr int kFineIterations = 8;
+constexpr int kFineIterations = 12;
 constexpr float kFineConverged_px = 0.03F;
 /// A shorter step of the translation: scale and rotation are let go too.
 constexpr float kTranslated_px = 0.1F;
@@ -26,7 +28,7 @@ constexpr float kMaxWarpScale = 1.7F;
 /// often looks right.
 constexpr float kMinCoarseCorrelation = 0.5F;
 /// Minimum sum of squares of a patch about its mean, gray values: a plain one cannot be aligned.
-constexpr float kMinNormSq = 64.0F;
+constexpr float kMinNormSq = 64.0F * static_cast<float>(kSplineContrast * kSplineContrast);
 /// Hessians worse conditioned than this have no inverse.
 constexpr float kMinDeterminant = 1e-3F;
 constexpr float kMinCondition = 1e-5F;
@@ -59,8 +61,15 @@ void cut_coarse(const BorderedImage& image, float x, float y, Patch::Coarse& coa
   ValuesAround around;
   patch_kernels().sample_coarse_around(image, x - kHalf, y - kHalf, around);
   differentiate(around, coarse.value.data(), coarse.gx.data(), coarse.gy.data());
-  const PatchVector gx(coarse.gx.data());
-  const PatchVector gy(coarse.gy.data());
+  PatchVector value(coarse.value.data());
+  PatchVector gx(coarse.gx.data());
+  PatchVector gy(coarse.gy.data());
+  value.array() -= value.mean();
+  coarse.norm_sq = value.squaredNorm() + std::numeric_limits<float>::min();
+  for (PatchVector& gradient : {std::ref(gx), std::ref(gy)}) {
+    gradient.array() -= gradient.mean();
+    gradient -= value * (value.dot(gradient) / coarse.norm_sq);
+  }
   const float xx = gx.squaredNorm();
   const float xy = gx.dot(gy);
   const float yy = gy.squaredNorm();
@@ -119,10 +128,12 @@ bool align_coarse(const Patch::Coarse& patch, const BorderedImage& image, float&
     if (!is_in_image(image, x, y, kReadable_px)) {
       return false;
     }
-    float sums[2];
+    float sums[3];
     kernels.coarse_sums(image, x - kHalf, y - kHalf, patch, sums);
-    const float dx = inverse[0] * sums[0] + inverse[1] * sums[1];
-    const float dy = inverse[1] * sums[0] + inverse[2] * sums[1];
+    // More contrast than the patch's would lead too far; less only takes more steps.
+    const float gain = std::max(sums[2] / patch.norm_sq, 1.0F);
+    const float dx = (inverse[0] * sums[0] + inverse[1] * sums[1]) / gain;
+    const float dy = (inverse[1] * sums[0] + inverse[2] * sums[1]) / gain;
     x -= dx;
     y -= dy;
     if (dx * dx + dy * dy < kCoarseConverged_px * kCoarseConverged_px) {

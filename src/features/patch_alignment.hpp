@@ -33,7 +33,7 @@ using FineColumns = std::array<FineValues, 4>;
 inline constexpr int kSideAround = kFineSide + 2;
 using ValuesAround = std::array<float, kSideAround * kSideAround>;
 
-/// Values and their gradient.
+/// Values, mean 0, and their gradient, made orthogonal to {1, value}: bias and gain drop out.
 struct CoarsePatch {
   CoarseValues value;
   CoarseValues gx;
@@ -47,10 +47,12 @@ struct PatchKernels {
   void (*sample_coarse)(const BorderedImage& image, float x, float y, CoarseValues& values);
   /// i and j from -1 to 8.
   void (*sample_coarse_around)(const BorderedImage& image, float x, float y, ValuesAround& values);
-  /// sums[0] = sum of gx e and sums[1] = of gy e, where e = sample - value, samples as above.
+  /// sums[0] = sum of gx sample, sums[1] of gy sample and sums[2] of value sample, samples as
+  /// above.
   void (*coarse_sums)(
       const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums);
-  /// Catmull-Rom samples at the similarity's images of (i - 3.5, j - 3.5), i and j from 0 to 7.
+  /// Cubic spline of the image's coefficients at the similarity's images of (i - 3.5, j - 3.5), i
+  /// and j from 0 to 7.
   void (*sample_fine)(const BorderedImage& image, const Similarity& warp, FineValues& values);
   /// Upright, i and j from -1 to 8.
   void (*sample_fine_around)(const BorderedImage& image, float x, float y, ValuesAround& values);
@@ -71,6 +73,7 @@ struct Patch {
   static constexpr int kNumCoarse = 4;
   struct Coarse : CoarsePatch {            ///< 8x8, moved by a translation
     std::array<float, 3> inverse_hessian;  ///< xx, xy, yy; all 0 where it has no inverse
+    float norm_sq = 0.0F;                  ///< of value
   };
   std::array<Coarse, kNumCoarse> coarse;  ///< of levels 1, 2, ..
   FineValues value;                       ///< 8x8 of level 0, mean 0
@@ -81,10 +84,13 @@ struct Patch {
   float norm_sq = 0.0F;          ///< of value
 };
 
-/// Pyramid: level k + 1 has half the size of level k, pixel (x, y) of it lies at (2x, 2y).
+/// Pyramid: level k + 1 has half the size of level k, pixel (x, y) of it lies at (2x, 2y). Level 0
+/// holds the coefficients of a cubic spline, at kSplineContrast.
 using Pyramid = std::span<const BorderedImage>;
 /// Alignment reads the images of a pyramid so far beyond their borders.
 inline constexpr int kPatchBorder_px = 24;
+/// The finest level has so much of the image's contrast.
+inline constexpr double kSplineContrast = 0.8;
 
 /// False: too little texture to be aligned.
 [[nodiscard]] bool cut_patch(Pyramid pyramid, float x, float y, Patch& patch);

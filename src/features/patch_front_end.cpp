@@ -10,9 +10,10 @@
 #include <vector>
 
 #include <Eigen/Geometry>
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
 
 #include "features/patch_alignment.hpp"
+#include "features/patch_pyramid.hpp"
 #include "features/point_front_end.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -34,11 +35,6 @@ constexpr int kPredictedLevel = 1;
 /// Where fewer of the points are found, they have moved further than the levels asked for reach:
 /// those that are missing are looked for from one coarser level on.
 constexpr double kFewFound = 0.3;
-/// Where fewer of those whose motion is known are found, the light may have changed unevenly (fog,
-/// the edge of a shadow), which only the finest level allows for: it looks alone, and must be
-/// surer.
-constexpr double kMostFound = 0.6;
-constexpr float kFoundAlone = 0.8F;
 /// So many points say whether a hint of the turn leads to them.
 constexpr std::size_t kNumProbes = 40;
 /// A hint that moves a start by less says what is expected anyway.
@@ -112,34 +108,14 @@ class PatchFrontEnd final : public PointFrontEnd {
   [[nodiscard]] std::shared_ptr<ImagePyramid> prepare(const ChannelImage& channel,
                                                       const cv::Mat& mask) const override {
     const StageTimer timer(Stage::kPyramid);
-    auto image = std::make_shared<PatchPyramid>(channel);
+    // The last level is for large motions.
+    auto image =
+        std::make_shared<PatchPyramid>(channel, num_levels(channel.map.scale.minCoeff()) + 1);
     image->mask = with_mask(mask);
-    image->levels.clear();
-    cv::Mat level = channel.pixels;
-    const int num = num_levels(channel.map.scale.minCoeff()) + 1;  // the last for large motions
-    for (int i = 0; i < num; ++i) {
-      if (i > 0) {
-        cv::Mat half;
-        cv::pyrDown(level, half);
-        level = half;
-      }
-      constexpr int kBorder = kPatchBorder_px;
-      cv::Mat bordered;
-      cv::copyMakeBorder(level, bordered, kBorder, kBorder, kBorder, kBorder,
-                         cv::BORDER_REFLECT_101);
-      level = bordered(cv::Rect(kBorder, kBorder, level.cols, level.rows));
-      image->levels.push_back(level);
-      image->bordered.push_back(
-          {level.data, static_cast<std::ptrdiff_t>(level.step), level.cols, level.rows});
-    }
     return image;
   }
 
  private:
-  struct PatchPyramid : ImagePyramid {
-    using ImagePyramid::ImagePyramid;
-    std::vector<BorderedImage> bordered;  ///< the levels, each in the middle of a larger image
-  };
   /// The motions that are expected of points between two images.
   class Outlook {
    public:
@@ -216,11 +192,14 @@ class PatchFrontEnd final : public PointFrontEnd {
     };
     std::vector<PatchMatch> found(from.points.size());
     // First the points that were tracked to here: they tell the others where to look.
-    const auto known_motion = [&](std::size_t i) {
-      const cv::Point2f& motion = tracks[i]->motion;
-      return is_turned ? outlook.turned(from.points[i].uv, motion) : outlook.on(motion);
-    };
-    find_known(from, tracks, align, known_motion, predicted, found);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      if (tracks[i]->frame == from.frame) {
+        const cv::Point2f& motion = tracks[i]->motion;
+        found[i] =
+            align(i, is_turned ? outlook.turned(from.points[i].uv, motion) : outlook.on(motion),
+                  predicted);
+      }
+    }
     const auto add_motion = [&](std::size_t i) {
       if (is_found(found[i])) {
         const cv::Point2f& uv = from.points[i].uv;
@@ -256,35 +235,6 @@ class PatchFrontEnd final : public PointFrontEnd {
       }
     }
     return result;
-  }
-
-  /// Points that were tracked to `from` are looked for where their motion leads.
-  template <typename Align, typename Motion>
-  static void find_known(const View& from,
-                         const std::vector<Track*>& tracks,
-                         const Align& align,
-                         const Motion& motion,
-                         int level,
-                         std::vector<PatchMatch>& found) {
-    const auto is_known = [&](const Track* track) { return track->frame == from.frame; };
-    const auto look = [&](int first_level, float least, std::vector<PatchMatch>& matches) {
-      for (std::size_t i = 0; i < matches.size(); ++i) {
-        if (is_known(tracks[i]) && !is_found(matches[i])) {
-          const PatchMatch match = align(i, motion(i), first_level);
-          matches[i] = match.correlation >= least ? match : matches[i];
-        }
-      }
-    };
-    const auto has_most = [&](const std::vector<PatchMatch>& matches) {
-      return static_cast<double>(std::ranges::count_if(matches, is_found)) >=
-             kMostFound * static_cast<double>(std::ranges::count_if(tracks, is_known));
-    };
-    look(level, kMinCorrelation, found);
-    if (!has_most(found)) {
-      std::vector<PatchMatch> alone = found;
-      look(0, kFoundAlone, alone);
-      found = has_most(alone) ? alone : found;  // else they have moved otherwise
-    }
   }
 
   /// A hint may be wrong: it counts where it leads to points, and to as many as no hint does.

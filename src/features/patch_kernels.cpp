@@ -110,29 +110,28 @@ STEMVO_INLINE void sample_coarse_around(const BorderedImage& image,
 STEMVO_INLINE void coarse_sums(
     const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums) {
   const Bilinear at = bilinear(image, x, y);
-  Float8 sum_x{};
-  Float8 sum_y{};
+  Float8 by[3] = {};
   for (int j = 0; j < kCoarseSide; ++j) {
     Float8 sample;
-    Float8 value;
-    Float8 gx;
-    Float8 gy;
     sample_row(at, j, sample);
-    load(patch.value.data() + j * kLanes, value);
-    load(patch.gx.data() + j * kLanes, gx);
-    load(patch.gy.data() + j * kLanes, gy);
-    sum_x += gx * (sample - value);
-    sum_y += gy * (sample - value);
+    const float* const factors[] = {patch.gx.data(), patch.gy.data(), patch.value.data()};
+    for (std::size_t k = 0; k < 3; ++k) {
+      Float8 factor;
+      load(factors[k] + j * kLanes, factor);
+      by[k] += factor * sample;
+    }
   }
-  sums[0] = sum(sum_x);
-  sums[1] = sum(sum_y);
+  for (std::size_t k = 0; k < 3; ++k) {
+    sums[k] = sum(by[k]);
+  }
 }
 
-STEMVO_INLINE void catmull_rom(float t, float* w) {
-  w[0] = t * (-0.5F + t * (1.0F - 0.5F * t));
-  w[1] = 1.0F + t * t * (-2.5F + 1.5F * t);
-  w[2] = t * (0.5F + t * (2.0F - 1.5F * t));
-  w[3] = t * t * (-0.5F + 0.5F * t);
+STEMVO_INLINE void cubic_spline(float t, float* w) {
+  const float s = 1.0F - t;
+  w[0] = s * s * s / 6.0F;
+  w[3] = t * t * t / 6.0F;
+  w[1] = 2.0F / 3.0F + t * t * (0.5F * t - 1.0F);
+  w[2] = 1.0F - w[0] - w[1] - w[3];
 }
 
 STEMVO_INLINE void fine_sums(const FineValues& values,
@@ -174,8 +173,8 @@ STEMVO_INLINE void sample_fine_upright(
   const float row = std::floor(y);
   float wx[kTaps];
   float wy[kTaps];
-  catmull_rom(x - column, wx);
-  catmull_rom(y - row, wy);
+  cubic_spline(x - column, wx);
+  cubic_spline(y - row, wy);
   const std::uint8_t* pixel = image.origin + (static_cast<std::ptrdiff_t>(row) - 1) * image.stride +
                               static_cast<std::ptrdiff_t>(column) - 1;
   Float8 rows[num_rows + kTaps - 1];
@@ -232,8 +231,8 @@ void sample_fine_portable(const BorderedImage& image, const Similarity& warp, Fi
       const float row = std::floor(y);
       float wx[4];
       float wy[4];
-      catmull_rom(x - column, wx);
-      catmull_rom(y - row, wy);
+      cubic_spline(x - column, wx);
+      cubic_spline(y - row, wy);
       const std::uint8_t* pixel = image.origin +
                                   (static_cast<std::ptrdiff_t>(row) - 1) * image.stride +
                                   static_cast<std::ptrdiff_t>(column) - 1;
@@ -253,16 +252,16 @@ constexpr PatchKernels kPortable{
     sample_fine_portable,         portable_copy<sample_fine_around>,   portable_copy<fine_sums>};
 
 #if defined(__x86_64__)
-STEMVO_AVX2 STEMVO_INLINE void catmull_rom(__m256 t, __m256* w) {
-  const __m256 half = _mm256_set1_ps(0.5F);
+STEMVO_AVX2 STEMVO_INLINE void cubic_spline(__m256 t, __m256* w) {
+  const __m256 sixth = _mm256_set1_ps(1.0F / 6.0F);
   const __m256 one = _mm256_set1_ps(1.0F);
   const __m256 t_sq = _mm256_mul_ps(t, t);
-  const __m256 half_t = _mm256_mul_ps(half, t);
-  w[0] = _mm256_mul_ps(t, _mm256_fmsub_ps(t, _mm256_sub_ps(one, half_t), half));
-  w[1] = _mm256_fmadd_ps(t_sq, _mm256_fmsub_ps(_mm256_set1_ps(1.5F), t, _mm256_set1_ps(2.5F)), one);
-  w[2] = _mm256_mul_ps(
-      t, _mm256_fmadd_ps(t, _mm256_fnmadd_ps(_mm256_set1_ps(1.5F), t, _mm256_set1_ps(2.0F)), half));
-  w[3] = _mm256_mul_ps(t_sq, _mm256_sub_ps(half_t, half));
+  const __m256 s = _mm256_sub_ps(one, t);
+  w[0] = _mm256_mul_ps(_mm256_mul_ps(s, s), _mm256_mul_ps(s, sixth));
+  w[3] = _mm256_mul_ps(t_sq, _mm256_mul_ps(t, sixth));
+  w[1] = _mm256_fmadd_ps(t_sq, _mm256_fmsub_ps(_mm256_set1_ps(0.5F), t, one),
+                         _mm256_set1_ps(2.0F / 3.0F));
+  w[2] = _mm256_sub_ps(_mm256_sub_ps(one, w[0]), _mm256_add_ps(w[1], w[3]));
 }
 
 /// Eight samples at once: a gather of four bytes holds the taps of one row.
@@ -287,8 +286,8 @@ STEMVO_AVX2 void sample_fine_avx2(const BorderedImage& image,
     const __m256 row = _mm256_floor_ps(y);
     __m256 wx[4];
     __m256 wy[4];
-    catmull_rom(_mm256_sub_ps(x, column), wx);
-    catmull_rom(_mm256_sub_ps(y, row), wy);
+    cubic_spline(_mm256_sub_ps(x, column), wx);
+    cubic_spline(_mm256_sub_ps(y, row), wy);
     __m256i offset = _mm256_add_epi32(_mm256_mullo_epi32(_mm256_cvtps_epi32(row), stride),
                                       _mm256_cvtps_epi32(column));
     const auto* pixels = reinterpret_cast<const int*>(image.origin - image.stride - 1);
