@@ -14,6 +14,8 @@ constexpr std::size_t kMinKeyframes = 3;
 /// A road that is not proven yet scales a map in so many frames, in which one is: later the path
 /// would change its unit for what may be a table.
 constexpr int kMaxGuessed = 10;
+/// One that says another order of speed than the assumed one is a table at once.
+constexpr double kMaxGuess = 2.0;     ///< logarithm
 constexpr double kNewLogScale = 0.1;  ///< a unit that changes by more is another one
 constexpr double kTrack_px = 0.7;     ///< error of a track over the window
 /// Road and ways that differ by more, and by so many sigmas, are not both right.
@@ -146,7 +148,8 @@ double MetricScale::measure(const RoadImage* road,
   is_scale_new_ = is_proven && (!is_scale_proven_ || is_unit_new_) && num_frames_ > kMaxGuessed &&
                   std::abs(filter_.log_scale()) > kNewLogScale;
   is_scale_proven_ = is_proven;
-  if (!filter_.is_initialized() || (!is_proven && num_frames_ > kMaxGuessed)) {
+  const bool may_guess = num_frames_ <= kMaxGuessed && std::abs(filter_.log_scale()) < kMaxGuess;
+  if (!filter_.is_initialized() || !(is_proven || may_guess)) {
     return 1.0;
   }
   const double metres_per_unit = std::exp(filter_.log_scale());

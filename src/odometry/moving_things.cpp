@@ -48,7 +48,10 @@ constexpr double kMinParty = 0.15;
 /// the thing does are the ones that tell the world's turn.
 constexpr double kOnPlane = 0.5;
 /// A motion explains matches where so many of their votes agree.
-constexpr double kExplains = 0.75;
+constexpr double kExplains = 0.55;
+/// One motion that explains so many times what two do is enough: in a scene without things that
+/// move two fit a little better, too.
+constexpr double kOneIsEnough = 0.85;
 /// Depth counts so many times.
 constexpr double kDepthWeight = 2.0;
 
@@ -135,6 +138,10 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
   std::vector<char> both = explained(other, pairs, camera, 2.0 * options.inlier_threshold_px);
   std::transform(both.begin(), both.end(), plane.begin(), both.begin(), std::logical_and<char>());
   if (votes(both) >= kExplains * plane_votes) {
+    return std::nullopt;
+  }
+  const double one_votes = votes(explained(all, pairs, camera, options.inlier_threshold_px));
+  if (one_votes >= kOneIsEnough * (plane_votes + other_votes)) {
     return std::nullopt;
   }
   const bool has_depth = other.homography_ratio <= options.homography_ratio;
