@@ -22,7 +22,7 @@ struct Least {
 /// Where they were looked for, some are found of anything.
 constexpr Least kLeastBySighting{30, 12, 0.4};
 /// The poses say already that it is the place.
-constexpr Least kLeastByPoses{20, 6, 0.4};
+constexpr Least kLeastByPoses{15, 6, 0.25};
 constexpr int kColumns = 6;
 constexpr int kRows = 4;
 /// So many of so many pairs or more are enough to look for more where a pose has them.

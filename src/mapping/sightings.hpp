@@ -25,7 +25,7 @@ struct Sighting {
   Loop loop;
 
   /// Streets that share a house look alike, too, but not all of it.
-  [[nodiscard]] bool may_join() const { return std::max(share, common) >= 0.25; }
+  [[nodiscard]] bool may_join() const { return std::max(share, common) >= 0.2; }
 };
 
 /// The sightings of the last lookups, which confirm each other.
