@@ -101,8 +101,6 @@ class PatchTracker {
 
 void bind_tracking(nb::module_& module) {
   nb::class_<ImagePyramid>(module, "SeenImage", "An image as the tracker sees it")
-      .def_prop_ro("pixels",
-                   [](const ImagePyramid& image) { return array_of(image.channel.pixels); })
       .def_prop_ro("num_levels", [](const ImagePyramid& image) { return image.levels.size(); });
   nb::class_<PatchTracker>(
       module, "PatchTracker",

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <limits>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -32,6 +30,9 @@ constexpr float kMinNormSq = 64.0F * static_cast<float>(kSplineContrast * kSplin
 /// Hessians worse conditioned than this have no inverse.
 constexpr float kMinDeterminant = 1e-3F;
 constexpr float kMinCondition = 1e-5F;
+/// Squares of a coarse patch and of its gradient: less is rounding.
+constexpr float kLeastNormSq = 1e-3F;
+constexpr float kLeastHessian = 1e-3F;
 
 /// So far outside, a coarse patch and the samples of its gradient are inside the border.
 constexpr float kReadable_px = 12.0F;
@@ -42,98 +43,93 @@ bool is_in_image(const BorderedImage& image, float x, float y, float outside_px 
          y <= static_cast<float>(image.height - 1) + outside_px;
 }
 
-using PatchVector = Eigen::Map<Eigen::Matrix<float, kFineSide * kFineSide, 1>>;
-using PatchArray = Eigen::Map<Eigen::Array<float, kFineSide, kFineSide, Eigen::RowMajor>>;
-static_assert(kCoarseSide == kFineSide);
+constexpr int kNumValues = kPatchSide * kPatchSide;
+constexpr float kHalf = 0.5F * (kPatchSide - 1);
+using PatchVector = Eigen::Map<Eigen::Matrix<float, kNumValues, 1>>;
+using PatchArray = Eigen::Map<Eigen::Array<float, kPatchSide, kPatchSide, Eigen::RowMajor>>;
 
-/// Values and their central differences, each 8x8.
-void differentiate(const ValuesAround& around, float* value, float* gx, float* gy) {
+/// The values, mean 0, and as first two columns their central differences.
+void differentiate(const ValuesAround& around, Patch::Level& level, auto& columns) {
   using Around = Eigen::Array<float, kSideAround, kSideAround, Eigen::RowMajor>;
   const Eigen::Map<const Around> all(around.data());
-  const auto part = [&](int row, int col) { return all.block<kFineSide, kFineSide>(row, col); };
-  PatchArray{value} = part(1, 1);
-  PatchArray{gx} = 0.5F * (part(1, 2) - part(1, 0));
-  PatchArray{gy} = 0.5F * (part(2, 1) - part(0, 1));
+  const auto part = [&](int row, int col) { return all.block<kPatchSide, kPatchSide>(row, col); };
+  PatchArray value(level.value.data());
+  value = part(1, 1) - part(1, 1).mean();
+  level.norm_sq = value.square().sum();
+  PatchArray{columns.col(0).data()} = 0.5F * (part(1, 2) - part(1, 0));
+  PatchArray{columns.col(1).data()} = 0.5F * (part(2, 1) - part(0, 1));
 }
 
-void cut_coarse(const BorderedImage& image, float x, float y, Patch::Coarse& coarse) {
-  constexpr float kHalf = 0.5F * (kCoarseSide - 1);
+void project_out_gain_and_bias(Patch::Level& level, auto& columns) {
+  const PatchVector value(level.value.data());
+  columns.rowwise() -= columns.colwise().mean();
+  const auto share =
+      (value.transpose().lazyProduct(columns) / std::max(level.norm_sq, kLeastNormSq)).eval();
+  columns -= value.lazyProduct(share);
+}
+
+void set(const auto& columns, PatchColumns& step) {
+  for (int k = 0; k < columns.cols(); ++k) {
+    PatchVector(step[static_cast<std::size_t>(k)].data()) = columns.col(k);
+  }
+}
+
+void cut_coarse(const BorderedImage& image, float x, float y, Patch::Level& level) {
   ValuesAround around;
   patch_kernels().sample_coarse_around(image, x - kHalf, y - kHalf, around);
-  differentiate(around, coarse.value.data(), coarse.gx.data(), coarse.gy.data());
-  PatchVector value(coarse.value.data());
-  PatchVector gx(coarse.gx.data());
-  PatchVector gy(coarse.gy.data());
-  value.array() -= value.mean();
-  coarse.norm_sq = value.squaredNorm() + std::numeric_limits<float>::min();
-  for (PatchVector& gradient : {std::ref(gx), std::ref(gy)}) {
-    gradient.array() -= gradient.mean();
-    gradient -= value * (value.dot(gradient) / coarse.norm_sq);
-  }
-  const float xx = gx.squaredNorm();
-  const float xy = gx.dot(gy);
-  const float yy = gy.squaredNorm();
-  const float determinant = xx * yy - xy * xy;
-  const float inverse =
-      determinant > kMinDeterminant * xx * yy && determinant > 0.0F ? 1.0F / determinant : 0.0F;
-  coarse.inverse_hessian = {yy * inverse, -xy * inverse, xx * inverse};
+  Eigen::Matrix<float, kNumValues, 2> columns;
+  differentiate(around, level, columns);
+  project_out_gain_and_bias(level, columns);
+  const Eigen::Matrix2f hessian = columns.transpose().lazyProduct(columns);
+  const bool has_inverse = hessian.diagonal().minCoeff() > kLeastHessian &&
+                           hessian.determinant() > kMinDeterminant * hessian.diagonal().prod();
+  set(columns.lazyProduct(has_inverse ? hessian.inverse().eval() : Eigen::Matrix2f::Zero().eval()),
+      level.translation_step);
 }
 
 bool cut_fine(const BorderedImage& image, float x, float y, Patch& patch) {
   ValuesAround around;
   patch_kernels().sample_fine_around(image, x, y, around);
-  Eigen::Matrix<float, kFineSide * kFineSide, 4> columns;
-  differentiate(around, patch.value.data(), columns.col(0).data(), columns.col(1).data());
-  PatchVector value(patch.value.data());
-  value.array() -= value.mean();
-  patch.norm_sq = value.squaredNorm();
-  if (!(patch.norm_sq > kMinNormSq)) {
+  Eigen::Matrix<float, kNumValues, 4> columns;
+  Patch::Level& level = patch.levels.front();
+  differentiate(around, level, columns);
+  if (!(level.norm_sq > kMinNormSq)) {
     return false;
   }
-  for (int i = 0; i < kFineSide * kFineSide; ++i) {
-    const int row = i / kFineSide;
-    const float dx = static_cast<float>(i % kFineSide) - 0.5F * (kFineSide - 1);
-    const float dy = static_cast<float>(row) - 0.5F * (kFineSide - 1);
+  for (int i = 0; i < kNumValues; ++i) {
+    const int row = i / kPatchSide;
+    const float dx = static_cast<float>(i % kPatchSide) - kHalf;
+    const float dy = static_cast<float>(row) - kHalf;
     columns(i, 2) = columns(i, 0) * dx + columns(i, 1) * dy;
     columns(i, 3) = columns(i, 1) * dx - columns(i, 0) * dy;
   }
-  columns.rowwise() -= columns.colwise().mean();
-  columns -= value * (value.transpose() * columns) / patch.norm_sq;
+  project_out_gain_and_bias(level, columns);
   const Eigen::Matrix4f hessian = columns.transpose() * columns;
   const Eigen::LDLT<Eigen::Matrix4f> solver(hessian);
   if (solver.info() != Eigen::Success || !(solver.rcond() > kMinCondition)) {
     return false;
   }
-  const Eigen::Matrix4f inverse = solver.solve(Eigen::Matrix4f::Identity());
-  const Eigen::Matrix2f of_translation = hessian.topLeftCorner<2, 2>().inverse();
-  for (int k = 0; k < 4; ++k) {
-    const auto index = static_cast<std::size_t>(k);
-    PatchVector(patch.step[index].data()) = columns * inverse.col(k);
-    PatchVector translation(patch.translation_step[index].data());
-    if (k < 2) {
-      translation = columns.leftCols<2>() * of_translation.col(k);
-    } else {
-      translation.setZero();
-    }
-  }
+  set(columns.lazyProduct(solver.solve(Eigen::Matrix4f::Identity()).eval()), patch.step);
+  set(columns.leftCols<2>().lazyProduct(hessian.topLeftCorner<2, 2>().inverse().eval()),
+      level.translation_step);
   return true;
 }
 
 /// False: it left the image.
-bool align_coarse(const Patch::Coarse& patch, const BorderedImage& image, float& x, float& y) {
+bool align_coarse(const Patch::Level& patch, const BorderedImage& image, float& x, float& y) {
   const PatchKernels& kernels = patch_kernels();
-  constexpr float kHalf = 0.5F * (kCoarseSide - 1);
-  const auto& inverse = patch.inverse_hessian;
   for (int i = 0; i < kCoarseIterations; ++i) {
     if (!is_in_image(image, x, y, kReadable_px)) {
       return false;
     }
-    float sums[3];
-    kernels.coarse_sums(image, x - kHalf, y - kHalf, patch, sums);
+    PatchValues values;
+    kernels.sample_coarse(image, x - kHalf, y - kHalf, values);
+    float sums[7];
+    kernels.sums(values, patch.translation_step, patch.value, sums);
     // More contrast than the patch's would lead too far; less only takes more steps.
-    const float gain = std::max(sums[2] / patch.norm_sq, 1.0F);
-    const float dx = (inverse[0] * sums[0] + inverse[1] * sums[1]) / gain;
-    const float dy = (inverse[1] * sums[0] + inverse[2] * sums[1]) / gain;
+    const float gain = std::max(sums[6] / std::max(patch.norm_sq, kLeastNormSq), 1.0F);
+    const float dx = sums[0] / gain;
+    const float dy = sums[1] / gain;
     x -= dx;
     y -= dy;
     if (dx * dx + dy * dy < kCoarseConverged_px * kCoarseConverged_px) {
@@ -168,24 +164,23 @@ bool is_plausible(const Similarity& warp, const BorderedImage& image, const Simi
 /// A translation first, until it has nearly converged; then the similarity.
 PatchMatch align_fine(const Patch& patch, const BorderedImage& image, const Similarity& start) {
   const PatchKernels& kernels = patch_kernels();
-  constexpr float kNumPixels = kFineSide * kFineSide;
+  const Patch::Level& level = patch.levels.front();
   PatchMatch result{start, 0.0F};
   bool only_translates = true;
   for (int i = 0; i < kFineIterations; ++i) {
     if (!is_plausible(result.warp, image, start)) {
       return {result.warp, 0.0F};
     }
-    FineValues values;
+    PatchValues values;
     kernels.sample_fine(image, result.warp, values);
     float sums[7];
-    kernels.fine_sums(values, only_translates ? patch.translation_step : patch.step, patch.value,
-                      sums);
-    const float variance = sums[5] - sums[4] * sums[4] / kNumPixels;
-    const float gain = sums[6] / patch.norm_sq;
+    kernels.sums(values, only_translates ? level.translation_step : patch.step, level.value, sums);
+    const float variance = sums[5] - sums[4] * sums[4] / kNumValues;
+    const float gain = sums[6] / level.norm_sq;
     if (!(variance > 0.0F && gain > kMinGain)) {
       return {result.warp, 0.0F};
     }
-    result.correlation = sums[6] / std::sqrt(variance * patch.norm_sq);
+    result.correlation = sums[6] / std::sqrt(variance * level.norm_sq);
     // The patch's derivatives have its contrast; the image's are `gain` times as large.
     const float step[4] = {sums[0] / gain, sums[1] / gain, sums[2] / gain, sums[3] / gain};
     const float length = compose(result.warp, step);
@@ -198,28 +193,13 @@ PatchMatch align_fine(const Patch& patch, const BorderedImage& image, const Simi
 }
 
 /// Correlation of the surroundings, which the finest level does not see.
-float coarse_correlation(const Patch::Coarse& patch, const BorderedImage& image, float x, float y) {
-  constexpr float kHalf = 0.5F * (kCoarseSide - 1);
-  constexpr float kNumPixels = kCoarseSide * kCoarseSide;
-  CoarseValues values;
+float coarse_correlation(const Patch::Level& patch, const BorderedImage& image, float x, float y) {
+  PatchValues values;
   patch_kernels().sample_coarse(image, x - kHalf, y - kHalf, values);
-  float sum_a = 0.0F;
-  float sum_b = 0.0F;
-  float sum_aa = 0.0F;
-  float sum_bb = 0.0F;
-  float sum_ab = 0.0F;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const float a = values[i];
-    const float b = patch.value[i];
-    sum_a += a;
-    sum_b += b;
-    sum_aa += a * a;
-    sum_bb += b * b;
-    sum_ab += a * b;
-  }
-  const float variances =
-      (sum_aa - sum_a * sum_a / kNumPixels) * (sum_bb - sum_b * sum_b / kNumPixels);
-  return variances > 0.0F ? (sum_ab - sum_a * sum_b / kNumPixels) / std::sqrt(variances) : 0.0F;
+  const PatchVector sample(values.data());
+  const float variances = patch.norm_sq * (sample.array() - sample.mean()).square().sum();
+  const Eigen::Map<const PatchVector::PlainObject> value(patch.value.data());
+  return variances > 0.0F ? sample.dot(value) / std::sqrt(variances) : 0.0F;
 }
 
 }  // namespace
@@ -231,7 +211,7 @@ bool cut_patch(Pyramid pyramid, float x, float y, Patch& patch) {
   float scale = 1.0F;
   for (std::size_t level = 1; level < pyramid.size() && level <= Patch::kNumCoarse; ++level) {
     scale *= 0.5F;
-    cut_coarse(pyramid[level], scale * x, scale * y, patch.coarse[level - 1]);
+    cut_coarse(pyramid[level], scale * x, scale * y, patch.levels[level]);
   }
   return true;
 }
@@ -247,7 +227,7 @@ PatchMatch align_patch(const Patch& patch,
     float x = scale * warp.x;
     float y = scale * warp.y;
     const auto index = static_cast<std::size_t>(level);
-    if (!align_coarse(patch.coarse[index - 1], pyramid[index], x, y)) {
+    if (!align_coarse(patch.levels[index], pyramid[index], x, y)) {
       return {warp, 0.0F};
     }
     warp.x = x / scale;
@@ -256,7 +236,7 @@ PatchMatch align_patch(const Patch& patch,
   const PatchMatch found = align_fine(patch, pyramid.front(), warp);
   const bool is_alone = pyramid.size() < 2 || found.correlation <= 0.0F;
   const bool is_there =
-      is_alone || coarse_correlation(patch.coarse[0], pyramid[1], 0.5F * found.warp.x,
+      is_alone || coarse_correlation(patch.levels[1], pyramid[1], 0.5F * found.warp.x,
                                      0.5F * found.warp.y) >= kMinCoarseCorrelation;
   return is_there ? found : PatchMatch{found.warp, 0.0F};
 }

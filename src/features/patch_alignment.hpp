@@ -24,44 +24,31 @@ struct Similarity {
   float b = 0.0F;
 };
 
-inline constexpr int kCoarseSide = 8;
-inline constexpr int kFineSide = 8;
-using CoarseValues = std::array<float, kCoarseSide * kCoarseSide>;
-using FineValues = std::array<float, kFineSide * kFineSide>;
-using FineColumns = std::array<FineValues, 4>;
+inline constexpr int kPatchSide = 8;
+using PatchValues = std::array<float, kPatchSide * kPatchSide>;
+using PatchColumns = std::array<PatchValues, 4>;
 /// A patch and a margin of one sample, for derivatives.
-inline constexpr int kSideAround = kFineSide + 2;
+inline constexpr int kSideAround = kPatchSide + 2;
 using ValuesAround = std::array<float, kSideAround * kSideAround>;
-
-/// Values, mean 0, and their gradient, made orthogonal to {1, value}: bias and gain drop out.
-struct CoarsePatch {
-  CoarseValues value;
-  CoarseValues gx;
-  CoarseValues gy;
-};
 
 /// The inner loops of alignment for one instruction set. The values of two sets
 /// differ in their last digits.
 struct PatchKernels {
   /// Bilinear samples at (x + i, y + j), i and j from 0 to 7.
-  void (*sample_coarse)(const BorderedImage& image, float x, float y, CoarseValues& values);
+  void (*sample_coarse)(const BorderedImage& image, float x, float y, PatchValues& values);
   /// i and j from -1 to 8.
   void (*sample_coarse_around)(const BorderedImage& image, float x, float y, ValuesAround& values);
-  /// sums[0] = sum of gx sample, sums[1] of gy sample and sums[2] of value sample, samples as
-  /// above.
-  void (*coarse_sums)(
-      const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums);
   /// Cubic spline of the image's coefficients at the similarity's images of (i - 3.5, j - 3.5), i
   /// and j from 0 to 7.
-  void (*sample_fine)(const BorderedImage& image, const Similarity& warp, FineValues& values);
+  void (*sample_fine)(const BorderedImage& image, const Similarity& warp, PatchValues& values);
   /// Upright, i and j from -1 to 8.
   void (*sample_fine_around)(const BorderedImage& image, float x, float y, ValuesAround& values);
   /// sums[k] = sum of columns[k] samples; sums[4] of samples; [5] of samples^2; [6] of samples
   /// value.
-  void (*fine_sums)(const FineValues& samples,
-                    const FineColumns& columns,
-                    const FineValues& value,
-                    float* sums);
+  void (*sums)(const PatchValues& samples,
+               const PatchColumns& columns,
+               const PatchValues& value,
+               float* sums);
 };
 
 /// The set that this process uses.
@@ -71,17 +58,16 @@ struct PatchKernels {
 /// (Baker and Matthews, Lucas-Kanade 20 years on, 2004).
 struct Patch {
   static constexpr int kNumCoarse = 4;
-  struct Coarse : CoarsePatch {            ///< 8x8, moved by a translation
-    std::array<float, 3> inverse_hessian;  ///< xx, xy, yy; all 0 where it has no inverse
-    float norm_sq = 0.0F;                  ///< of value
+  struct Level {
+    PatchValues value;  ///< 8x8, mean 0
+    /// Rows of the inverse Hessian of a translation times its steepest-descent images, made
+    /// orthogonal to {1, value}: bias and gain drop out. The last two, or all where there is no
+    /// inverse, are 0.
+    PatchColumns translation_step{};
+    float norm_sq = 0.0F;  ///< of value
   };
-  std::array<Coarse, kNumCoarse> coarse;  ///< of levels 1, 2, ..
-  FineValues value;                       ///< 8x8 of level 0, mean 0
-  /// Rows of the inverse Hessian times the steepest-descent images (x, y, scale, rotation) made
-  /// orthogonal to {1, value}: bias and gain drop out.
-  FineColumns step;
-  FineColumns translation_step;  ///< of a translation alone; the last two are 0
-  float norm_sq = 0.0F;          ///< of value
+  std::array<Level, 1 + kNumCoarse> levels;
+  PatchColumns step;  ///< of level 0, likewise of a similarity: x, y, scale, rotation
 };
 
 /// Pyramid: level k + 1 has half the size of level k, pixel (x, y) of it lies at (2x, 2y). Level 0

@@ -191,6 +191,12 @@ class PatchFrontEnd final : public PointFrontEnd {
       return motions.empty() && is_turned ? outlook.turned(uv) : motions.near(uv);
     };
     std::vector<PatchMatch> found(from.points.size());
+    const auto add_motion = [&](std::size_t i) {
+      if (is_found(found[i])) {
+        const cv::Point2f& uv = from.points[i].uv;
+        motions.add(uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - uv);
+      }
+    };
     // First the points that were tracked to here: they tell the others where to look.
     for (std::size_t i = 0; i < found.size(); ++i) {
       if (tracks[i]->frame == from.frame) {
@@ -198,16 +204,8 @@ class PatchFrontEnd final : public PointFrontEnd {
         found[i] =
             align(i, is_turned ? outlook.turned(from.points[i].uv, motion) : outlook.on(motion),
                   predicted);
+        add_motion(i);
       }
-    }
-    const auto add_motion = [&](std::size_t i) {
-      if (is_found(found[i])) {
-        const cv::Point2f& uv = from.points[i].uv;
-        motions.add(uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - uv);
-      }
-    };
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      add_motion(i);
     }
     std::vector<std::optional<cv::Point2f>> result(found.size());
     for (std::size_t i = 0; i < found.size(); ++i) {

@@ -18,7 +18,7 @@ namespace {
 /// intrinsics, and make worse code of plain loops.
 using Float8 = float __attribute__((vector_size(32)));
 constexpr int kLanes = 8;
-static_assert(kCoarseSide == kLanes && kFineSide == kLanes);
+static_assert(kPatchSide == kLanes);
 
 /// Eight bytes, widened by interleaving them with zeros: twice, to 32 bits.
 STEMVO_INLINE void load(const std::uint8_t* from, Float8& values) {
@@ -84,9 +84,9 @@ STEMVO_INLINE void sample_row(const Bilinear& at, int row, Float8& values) {
 STEMVO_INLINE void sample_coarse(const BorderedImage& image,
                                  float x,
                                  float y,
-                                 CoarseValues& values) {
+                                 PatchValues& values) {
   const Bilinear at = bilinear(image, x, y);
-  for (int j = 0; j < kCoarseSide; ++j) {
+  for (int j = 0; j < kPatchSide; ++j) {
     Float8 row;
     sample_row(at, j, row);
     store(row, values.data() + j * kLanes);
@@ -107,25 +107,6 @@ STEMVO_INLINE void sample_coarse_around(const BorderedImage& image,
   }
 }
 
-STEMVO_INLINE void coarse_sums(
-    const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums) {
-  const Bilinear at = bilinear(image, x, y);
-  Float8 by[3] = {};
-  for (int j = 0; j < kCoarseSide; ++j) {
-    Float8 sample;
-    sample_row(at, j, sample);
-    const float* const factors[] = {patch.gx.data(), patch.gy.data(), patch.value.data()};
-    for (std::size_t k = 0; k < 3; ++k) {
-      Float8 factor;
-      load(factors[k] + j * kLanes, factor);
-      by[k] += factor * sample;
-    }
-  }
-  for (std::size_t k = 0; k < 3; ++k) {
-    sums[k] = sum(by[k]);
-  }
-}
-
 STEMVO_INLINE void cubic_spline(float t, float* w) {
   const float s = 1.0F - t;
   w[0] = s * s * s / 6.0F;
@@ -134,15 +115,15 @@ STEMVO_INLINE void cubic_spline(float t, float* w) {
   w[2] = 1.0F - w[0] - w[1] - w[3];
 }
 
-STEMVO_INLINE void fine_sums(const FineValues& values,
-                             const FineColumns& columns,
-                             const FineValues& value,
-                             float* sums) {
+STEMVO_INLINE void sums_of(const PatchValues& values,
+                           const PatchColumns& columns,
+                           const PatchValues& value,
+                           float* sums) {
   Float8 by_column[4] = {};
   Float8 of_samples{};
   Float8 of_squares{};
   Float8 by_value{};
-  for (int j = 0; j < kFineSide; ++j) {
+  for (int j = 0; j < kPatchSide; ++j) {
     Float8 sample;
     Float8 other;
     load(values.data() + j * kLanes, sample);
@@ -193,14 +174,14 @@ STEMVO_INLINE void sample_fine_upright(
   }
 }
 
-constexpr float kHalfFine = 0.5F * (kFineSide - 1);
+constexpr float kHalfFine = 0.5F * (kPatchSide - 1);
 
 STEMVO_INLINE void sample_fine_upright(const BorderedImage& image,
                                        float center_x,
                                        float center_y,
-                                       FineValues& values) {
-  sample_fine_upright<kFineSide>(image, center_x - kHalfFine, center_y - kHalfFine, values.data(),
-                                 kFineSide);
+                                       PatchValues& values) {
+  sample_fine_upright<kPatchSide>(image, center_x - kHalfFine, center_y - kHalfFine, values.data(),
+                                  kPatchSide);
 }
 
 STEMVO_INLINE void sample_fine_around(const BorderedImage& image,
@@ -215,16 +196,15 @@ STEMVO_INLINE void sample_fine_around(const BorderedImage& image,
 
 STEMVO_INLINE bool is_upright(const Similarity& warp) { return warp.a == 1.0F && warp.b == 0.0F; }
 
-void sample_fine_portable(const BorderedImage& image, const Similarity& warp, FineValues& values) {
+void sample_fine_portable(const BorderedImage& image, const Similarity& warp, PatchValues& values) {
   if (is_upright(warp)) {
     sample_fine_upright(image, warp.x, warp.y, values);
     return;
   }
-  constexpr float kCenter = 0.5F * (kFineSide - 1);
-  for (int j = 0; j < kFineSide; ++j) {
-    for (int i = 0; i < kFineSide; ++i) {
-      const float dx = static_cast<float>(i) - kCenter;
-      const float dy = static_cast<float>(j) - kCenter;
+  for (int j = 0; j < kPatchSide; ++j) {
+    for (int i = 0; i < kPatchSide; ++i) {
+      const float dx = static_cast<float>(i) - kHalfFine;
+      const float dy = static_cast<float>(j) - kHalfFine;
       const float x = warp.x + warp.a * dx - warp.b * dy;
       const float y = warp.y + warp.b * dx + warp.a * dy;
       const float column = std::floor(x);
@@ -242,14 +222,14 @@ void sample_fine_portable(const BorderedImage& image, const Similarity& warp, Fi
                     wx[2] * static_cast<float>(pixel[2]) + wx[3] * static_cast<float>(pixel[3]));
         pixel += image.stride;
       }
-      values[static_cast<std::size_t>(j * kFineSide + i)] = sum;
+      values[static_cast<std::size_t>(j * kPatchSide + i)] = sum;
     }
   }
 }
 
-constexpr PatchKernels kPortable{
-    portable_copy<sample_coarse>, portable_copy<sample_coarse_around>, portable_copy<coarse_sums>,
-    sample_fine_portable,         portable_copy<sample_fine_around>,   portable_copy<fine_sums>};
+constexpr PatchKernels kPortable{portable_copy<sample_coarse>, portable_copy<sample_coarse_around>,
+                                 sample_fine_portable, portable_copy<sample_fine_around>,
+                                 portable_copy<sums_of>};
 
 #if defined(__x86_64__)
 STEMVO_AVX2 STEMVO_INLINE void cubic_spline(__m256 t, __m256* w) {
@@ -267,19 +247,18 @@ STEMVO_AVX2 STEMVO_INLINE void cubic_spline(__m256 t, __m256* w) {
 /// Eight samples at once: a gather of four bytes holds the taps of one row.
 STEMVO_AVX2 void sample_fine_avx2(const BorderedImage& image,
                                   const Similarity& warp,
-                                  FineValues& values) {
+                                  PatchValues& values) {
   if (is_upright(warp)) {
     sample_fine_upright(image, warp.x, warp.y, values);
     return;
   }
-  constexpr float kCenter = 0.5F * (kFineSide - 1);
   const __m256 dx = _mm256_setr_ps(-3.5F, -2.5F, -1.5F, -0.5F, 0.5F, 1.5F, 2.5F, 3.5F);
   const __m256 ax = _mm256_fmadd_ps(_mm256_set1_ps(warp.a), dx, _mm256_set1_ps(warp.x));
   const __m256 bx = _mm256_fmadd_ps(_mm256_set1_ps(warp.b), dx, _mm256_set1_ps(warp.y));
   const __m256i stride = _mm256_set1_epi32(static_cast<int>(image.stride));
   const __m256i low = _mm256_set1_epi32(255);
-  for (int j = 0; j < kFineSide; ++j) {
-    const float dy = static_cast<float>(j) - kCenter;
+  for (int j = 0; j < kPatchSide; ++j) {
+    const float dy = static_cast<float>(j) - kHalfFine;
     const __m256 x = _mm256_sub_ps(ax, _mm256_set1_ps(warp.b * dy));
     const __m256 y = _mm256_add_ps(bx, _mm256_set1_ps(warp.a * dy));
     const __m256 column = _mm256_floor_ps(x);
@@ -304,13 +283,12 @@ STEMVO_AVX2 void sample_fine_avx2(const BorderedImage& image,
       sum = _mm256_fmadd_ps(w, in_row, sum);
       offset = _mm256_add_epi32(offset, stride);
     }
-    _mm256_storeu_ps(values.data() + j * kFineSide, sum);
+    _mm256_storeu_ps(values.data() + j * kPatchSide, sum);
   }
 }
 
-constexpr PatchKernels kAvx2{avx2_copy<sample_coarse>,      avx2_copy<sample_coarse_around>,
-                             avx2_copy<coarse_sums>,        sample_fine_avx2,
-                             avx2_copy<sample_fine_around>, avx2_copy<fine_sums>};
+constexpr PatchKernels kAvx2{avx2_copy<sample_coarse>, avx2_copy<sample_coarse_around>,
+                             sample_fine_avx2, avx2_copy<sample_fine_around>, avx2_copy<sums_of>};
 #endif
 
 }  // namespace

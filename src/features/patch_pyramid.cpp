@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 
 #include <opencv2/imgproc.hpp>
 
@@ -38,15 +39,13 @@ cv::Mat spline_coefficients(const cv::Mat& pixels) {
 
 PatchPyramid::PatchPyramid(const ChannelImage& seen, int num_levels)
     : ImagePyramid(seen), coefficients_(with_border(spline_coefficients(seen.pixels))) {
-  levels.clear();
-  for (int i = 0; i < num_levels; ++i) {
-    cv::Mat level = seen.pixels;
-    if (i > 0) {
-      cv::pyrDown(levels.back(), level);
-      level = with_border(level);
-    }
-    levels.push_back(level);
-    const cv::Mat& aligned = i > 0 ? level : coefficients_;
+  while (std::ssize(levels) < num_levels) {
+    cv::Mat half;
+    cv::pyrDown(levels.back(), half);
+    levels.push_back(with_border(half));
+  }
+  for (const cv::Mat& level : levels) {
+    const cv::Mat& aligned = bordered.empty() ? coefficients_ : level;
     bordered.push_back(
         {aligned.data, static_cast<std::ptrdiff_t>(aligned.step), aligned.cols, aligned.rows});
   }

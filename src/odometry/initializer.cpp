@@ -54,13 +54,6 @@ bool is_same(const Rigid3& a, const Rigid3& b) {
          a.translation.dot(b.translation) > std::cos(kSameAngle_rad);
 }
 
-/// The way has length 1: its covariance is of its direction.
-bool has_direction(const Matrix6d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance.topLeftCorner<3, 3>(),
-                                                            Eigen::EigenvaluesOnly);
-  return axes.eigenvalues().maxCoeff() < kMaxDirectionSigma_rad * kMaxDirectionSigma_rad;
-}
-
 /// The hypotheses with nearly the most good points.
 std::vector<Hypothesis> plausible_hypotheses(const MeasuredMotion& motion,
                                              const PixelPairs& pairs,
@@ -185,9 +178,12 @@ void Initializer::choose_motion(const PixelPairs& pairs,
   motion.cur_from_prev = best.cur_from_prev;
   motion.inlier_mask = chosen.test.good_mask;
   two_view_.refine(pairs, camera, motion);
+  // The way has length 1: its covariance is of its direction.
+  const double direction_variance =
+      motion.covariance.topLeftCorner<3, 3>().selfadjointView<Eigen::Lower>().operatorNorm();
   motion.is_decisive = is_decisive(chosen, num_pairs, kAcceptance) &&
                        (rival == hypotheses.end() || rival->cost > kMinMargin * best.cost) &&
-                       has_direction(motion.covariance);
+                       direction_variance < kMaxDirectionSigma_rad * kMaxDirectionSigma_rad;
 }
 
 Matrix6d Initializer::opening_error(const MeasuredMotion& motion,

@@ -14,8 +14,9 @@ constexpr std::size_t kMinKeyframes = 3;
 /// A road that is not proven yet scales a map in so many frames, in which one is: later the path
 /// would change its unit for what may be a table.
 constexpr int kMaxGuessed = 10;
-/// One that says another order of speed than the assumed one is a table at once.
-constexpr double kMaxGuess = 2.0;     ///< logarithm
+/// One whose scale has a larger logarithm says another order of speed than the assumed one: a
+/// table.
+constexpr double kMaxGuess = 2.0;
 constexpr double kNewLogScale = 0.1;  ///< a unit that changes by more is another one
 constexpr double kTrack_px = 0.7;     ///< error of a track over the window
 /// Road and ways that differ by more, and by so many sigmas, are not both right.

@@ -43,9 +43,9 @@ struct MotionRivals {
 /// Tells the world's motion from that of a thing before the camera by one pair of frames, nothing
 /// else being known. `all`, measured on all matches, names the dominant homography: what it
 /// explains is one party, a motion of the other matches the second one. They are rivals where the
-/// second does not explain the first party. The world is the one that more of the image's cells
-/// agree with; a thing is nearly a plane, so one that only depth explains needs half as many.
-/// nullopt: no rivals, `all` is the motion.
+/// second does not explain the first party, and `all` explains clearly less than both. The world is
+/// the one that more of the image's cells agree with; a thing is nearly a plane, so one that only
+/// depth explains needs half as many. nullopt: no rivals, `all` is the motion.
 [[nodiscard]] std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
                                                       const PixelPairs& pairs,
                                                       const Camera& camera,

@@ -35,6 +35,7 @@ struct View {
   double bias = 0.0;
   double noise = 0.0;
   double blur_px = 0.0;
+  double gain_before = 1.0;  ///< of the image that it is compared with
 
   [[nodiscard]] cv::Mat render() const {
     cv::Mat values(kViewHeight, kViewWidth, CV_64F);
@@ -101,7 +102,7 @@ struct PlantedPoints {
   }
 
   View view;
-  cv::Mat before = View().render();
+  cv::Mat before = View{{}, view.gain_before, 128.0 * (1.0 - view.gain_before)}.render();
   cv::Mat after = view.render();
   std::vector<cv::Point2f> from;
   std::vector<cv::Point2f> truth;
@@ -174,6 +175,7 @@ TEST(PatchAlignment, ErrorsOfPlantedWarps) {
            {"turn 0.1", {{kX, kY, 1.0F, 0.1F}}, 0.02, 0.025, 0.99},
            {"gain 0.7, bias 20", {shifted, 0.7, 20.0}, 0.02, 0.03, 0.99},
            {"gain 0.4, bias 110", {shifted, 0.4, 110.0}, 0.03, 0.05, 0.99},
+           {"gain 2.5", {shifted, 1.0, 0.0, 0.0, 0.0, 0.4}, 0.03, 0.05, 0.99},
            {"noise 2, blur 1 px, scale 1.1",
             {{kX, kY, 1.1F, 0.0F}, 1.0, 0.0, 2.0, 1.0},
             0.2,

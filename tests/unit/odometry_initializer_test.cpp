@@ -88,7 +88,7 @@ TEST(Initializer, APlanarSceneDecidesByTheHomography) {
   EXPECT_GE(num_right, 4);
 }
 
-/// Without the bound of its sigma the worst of them is off by 0.24.
+/// Without the bound of its sigma the worst of them is off by 0.20.
 TEST(Initializer, NoisyPointsDecideOnceTheyTellTheDirection) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     const Rigid3 step(so3_exp({0.0, 0.002, 0.0}), {0.1 / 30.0, 0.0, 0.0});

@@ -32,11 +32,11 @@ def _inside(points: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return np.all((points > MARGIN) & (points < np.array(shape[1::-1]) - 1 - MARGIN), axis=1)
 
 
-def land(options: Mapping[str, Any], pair: pairs.Pair, reach: float, rng: np.random.Generator) -> Landed:
-    """Corners of the channel of `options` in `before`, each aligned in `after` from up to `reach` px off its true place."""
+def land(options: Mapping[str, Any], pair: pairs.Pair, reach: float, rng: np.random.Generator, corners: int | None = None) -> Landed:
+    """Corners (the strongest so many) of the channel of `options` in `before`, each aligned in `after` from up to `reach` px off its true place."""
     tracker = PatchTracker({"stem.tracking_resolution": "half", **options})
     before, after = tracker.see(pair.before), tracker.see(pair.after)
-    points = tracker.corners(before)
+    points = tracker.corners(before)[:corners]
     true = points @ pair.motion[:, :2].T + pair.motion[:, 2]
     seen = _inside(points, pair.before.shape) & _inside(true, pair.before.shape)
     points, true = np.ascontiguousarray(points[seen]), true[seen]
@@ -73,7 +73,7 @@ def geometric_mean(by_disturbance: Mapping[str, Sequence[Landed]]) -> tuple[floa
 
 
 def measure(channels: Mapping[str, Mapping[str, Any]], frames: Sequence[np.ndarray], *, reach: float = NEAR,
-            disturbances: Sequence[str] = tuple(pairs.DISTURBANCES), seed: int = 1) -> dict[str, dict[str, list[Landed]]]:
+            disturbances: Sequence[str] = tuple(pairs.DISTURBANCES), seed: int = 1, corners: int | None = None) -> dict[str, dict[str, list[Landed]]]:
     """channel -> disturbance -> one entry a frame. Every channel (options of the odometry) sees the same pairs and starts."""
     result = {name: {kind: [] for kind in disturbances} for name in channels}
     for number, frame in enumerate(frames):
@@ -81,7 +81,7 @@ def measure(channels: Mapping[str, Mapping[str, Any]], frames: Sequence[np.ndarr
             of_pair = [seed, number, list(pairs.DISTURBANCES).index(kind)]
             pair = pairs.plant(frame, kind, np.random.default_rng(of_pair))
             for name, options in channels.items():
-                result[name][kind].append(land(options, pair, reach, np.random.default_rng([*of_pair, 1])))
+                result[name][kind].append(land(options, pair, reach, np.random.default_rng([*of_pair, 1]), corners))
     return result
 
 
@@ -114,16 +114,17 @@ def table(result: Mapping[str, Mapping[str, Sequence[Landed]]]) -> str:
 @click.argument("recordings", nargs=-1, required=True)
 @click.option("--channel", "channels", multiple=True, default=("default", "gray"), show_default=True, help="MODEL or MODEL:FILTER, as stem.model and stem.filter.")
 @click.option("--frames", type=click.IntRange(1), default=12, show_default=True, help="Of each recording, evenly along it.")
+@click.option("--corners", type=click.IntRange(1), help="Of each frame, the strongest; default: all that the odometry would take.")
 @click.option("--far", is_flag=True, help=f"Starts up to {FAR:g} px off (default: {NEAR:g}).")
 @click.option("--seed", default=1, show_default=True)
 @click.option("--json", "out", type=click.Path(dir_okay=False), help="The rows, as a file.")
-def command(recordings, channels, frames, far, seed, out):
+def command(recordings, channels, frames, corners, far, seed, out):
     """How far tracked points land from where they are: frames of RECORDINGS, warped and disturbed, tracked on each channel.
 
     For each disturbance: median error in input px (5 to 95 %, bootstrap over the frames), 90th percentile; share of the points that
     is found, and found in a wrong place (2 px off and more)."""
     images = [image for recording in recordings for image in frames_of(recording, frames)]
-    result = measure({text: channel_of(text) for text in channels}, images, reach=FAR if far else NEAR, seed=seed)
+    result = measure({text: channel_of(text) for text in channels}, images, reach=FAR if far else NEAR, seed=seed, corners=corners)
     click.echo(table(result))
     if out:
         rows = {name: {kind: row(landed) for kind, landed in found.items()} for name, found in result.items()}

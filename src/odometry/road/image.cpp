@@ -31,22 +31,13 @@ Camera camera_in(const Camera& camera, const PixelMap& map, const cv::Size& size
 /// Values and their gradient (central differences), pixel by pixel; `hidden`: of their size, or
 /// empty.
 cv::Mat with_gradient(const cv::Mat& values, const cv::Mat& hidden) {
-  cv::Mat result(values.size(), CV_32FC4);
-  for (int v = 0; v < values.rows; ++v) {
-    const auto* here = values.ptr<float>(v);
-    const auto* above = values.ptr<float>(std::max(v - 1, 0));
-    const auto* below = values.ptr<float>(std::min(v + 1, values.rows - 1));
-    auto* out = result.ptr<cv::Vec4f>(v);
-    for (int u = 1; u + 1 < values.cols; ++u) {
-      out[u] = {here[u], 0.5F * (here[u + 1] - here[u - 1]), 0.5F * (below[u] - above[u]), 0.0F};
-    }
-    out[0] = {here[0], 0.0F, 0.0F, 0.0F};
-    const int last = values.cols - 1;
-    out[last] = {here[last], 0.0F, 0.0F, 0.0F};
-  }
-  if (!hidden.empty()) {
-    cv::insertChannel(hidden, result, 3);
-  }
+  cv::Mat along_x;
+  cv::Mat along_y;
+  cv::Mat result;
+  cv::Sobel(values, along_x, CV_32F, 1, 0, 1, 0.5, 0.0, cv::BORDER_REPLICATE);
+  cv::Sobel(values, along_y, CV_32F, 0, 1, 1, 0.5, 0.0, cv::BORDER_REPLICATE);
+  const cv::Mat shown = cv::Mat::zeros(values.size(), CV_32F);
+  cv::merge(std::vector{values, along_x, along_y, hidden.empty() ? shown : hidden}, result);
   return result;
 }
 
