@@ -18,8 +18,9 @@ cv::Mat with_border(const cv::Mat& level) {
 }
 
 /// Coefficients of the cubic B-spline through the pixels (Unser, Splines: a perfect fit, 1999). The
-/// filter sharpens: 8 bits hold its values about the middle of their range at less contrast, which
-/// alignment allows for.
+/// filter sharpens: about the middle of their range and at less contrast 8 bits hold its values but
+/// for the sharpest corners; alignment allows for it. Less would cost bits: at 0.6 the default
+/// channel lands 1 % worse, census 3 % better.
 cv::Mat spline_coefficients(const cv::Mat& pixels) {
   constexpr double kPole = -0.26794919243112270;  // sqrt(3) - 2
   constexpr int kReach = 3;                       // the pole's fourth power is 0.005

@@ -18,11 +18,12 @@ struct Least {
   std::size_t num_inliers = 30;
   int num_cells = 12;
   double share = 0.0;
+  double agreement = 0.7;  ///< of what either side found alone, that one similarity must explain
 };
 /// Where they were looked for, some are found of anything.
 constexpr Least kLeastBySighting{30, 12, 0.4};
 /// The poses say already that it is the place.
-constexpr Least kLeastByPoses{15, 6, 0.25};
+constexpr Least kLeastByPoses{15, 6, 0.25, 0.6};
 constexpr int kColumns = 6;
 constexpr int kRows = 4;
 /// So many of so many pairs or more are enough to look for more where a pose has them.
@@ -40,8 +41,6 @@ constexpr double kDepthError = 0.15;
 constexpr double kLoss_px = 1.0;
 /// Bits in which a landmark differs from a corner near its projection.
 constexpr int kGuidedBits = 80;
-/// So much of what either side found alone, one similarity must explain.
-constexpr double kMinAgreement = 0.7;
 constexpr std::uint64_t kSeed = 1;
 /// Errors of landmarks are alike: so many times the standard deviations of independent ones.
 constexpr double kLoopSigmaFactor = 3.0;
@@ -342,13 +341,13 @@ std::optional<Loop> check_place(const PlaceView& old,
   Loop loop;
   loop.from_to = refined.a_from_b;
   loop.corners = agreeing(loop.from_to, old, recent, near);
-  const auto explained = [&](const std::vector<DescriptorPair>& found) {
-    return static_cast<double>(agreeing(loop.from_to, old, recent, found).size()) >=
-           kMinAgreement * static_cast<double>(found.size());
-  };
   const Least least = !expected.has_value()  ? Least()
                       : expected->is_certain ? kLeastByPoses
                                              : kLeastBySighting;
+  const auto explained = [&](const std::vector<DescriptorPair>& found) {
+    return static_cast<double>(agreeing(loop.from_to, old, recent, found).size()) >=
+           least.agreement * static_cast<double>(found.size());
+  };
   if (!is_enough(recent, loop.corners, least) || back.size() < least.num_inliers ||
       static_cast<double>(on_old->inliers.size()) <
           least.share * static_cast<double>(pairs.size()) ||

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The odometry's patch aligner (src/features/patch_alignment.cpp) for JAX: differentiable, a batch at a time, two levels.
 
-Patches of 8x8: a translation on the coarser level, a similarity on the finer; inverse composition, samples of a cubic spline, gain
-and bias projected out."""
+Patches of 8x8: a translation on the coarser level, a similarity on the finer; inverse composition, samples of a cubic spline (in C++
+bilinear ones on the coarser), gain and bias projected out."""
 
 import jax
 import jax.numpy as jnp
