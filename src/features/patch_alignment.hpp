@@ -58,7 +58,7 @@ struct PatchKernels {
 /// (Baker and Matthews, Lucas-Kanade 20 years on, 2004).
 struct Patch {
   static constexpr int kNumCoarse = 4;
-  struct Level {
+  struct alignas(32) Level {
     PatchValues value;  ///< 8x8, mean 0
     /// Rows of the inverse Hessian of a translation times its steepest-descent images, made
     /// orthogonal to {1, value}: bias and gain drop out. The last two, or all where there is no
@@ -76,7 +76,7 @@ using Pyramid = std::span<const BorderedImage>;
 /// Alignment reads the images of a pyramid so far beyond their borders.
 inline constexpr int kPatchBorder_px = 24;
 /// The finest level has so much of the image's contrast.
-inline constexpr double kSplineContrast = 0.8;
+inline constexpr double kSplineContrast = 0.7;
 
 /// False: too little texture to be aligned.
 [[nodiscard]] bool cut_patch(Pyramid pyramid, float x, float y, Patch& patch);
