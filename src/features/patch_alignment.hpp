@@ -58,6 +58,7 @@ struct PatchKernels {
 /// (Baker and Matthews, Lucas-Kanade 20 years on, 2004).
 struct Patch {
   static constexpr int kNumCoarse = 4;
+  /// Aligned, so that sums do not depend on where a patch lies.
   struct alignas(32) Level {
     PatchValues value;  ///< 8x8, mean 0
     /// Rows of the inverse Hessian of a translation times its steepest-descent images, made

@@ -19,7 +19,7 @@ cv::Mat with_border(const cv::Mat& level) {
 
 /// Coefficients of the cubic B-spline through the pixels (Unser, Splines: a perfect fit, 1999). The
 /// filter sharpens: about the middle of their range and at less contrast 8 bits hold its values,
-/// which alignment allows for. At 0.8 a quarter of census' corners were clipped.
+/// which alignment allows for.
 cv::Mat spline_coefficients(const cv::Mat& pixels) {
   constexpr double kPole = -0.26794919243112270;  // sqrt(3) - 2
   constexpr int kReach = 3;                       // the pole's fourth power is 0.005
