@@ -71,7 +71,7 @@ class TestPackage:
         if done["errors"]:  # the keys and shapes of metrics.json; of matrices where the program has quaternions
             mine, expected = ((e | e["ate_rmse_m"] | {"ate_rmse_m": sorted(e["ate_rmse_m"])} for e in (done["errors"], metrics)))
             for key, error in mine.items():
-                assert abs(error - expected[key]) < 1e-9 * max(1, abs(error)) if isinstance(error, float) else error == expected[key], f"{recording}: {key}"
+                assert abs(error - expected[key]) < 1e-9 if isinstance(error, float) else error == expected[key], f"{recording}: {key}"
             assert list(done["errors"]) == [key for key in metrics if key in done["errors"]]
         assert (done["true_frames"] is None) == (metrics["ate_rmse_m"] is None), recording
         return done
