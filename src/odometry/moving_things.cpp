@@ -78,6 +78,8 @@ std::vector<char> explained(const MeasuredMotion& motion,
   return epipolar_inliers(motion.cur_from_prev, pairs, camera, bound_px);
 }
 
+/// Frames in which a thing that was not known moves apart from the world.
+constexpr int kMinApart = 2;
 /// Evidence of a track when it is taken for a thing's, and the most it can have.
 constexpr int kFirstEvidence = 2;
 constexpr int kMostEvidence = 5;
@@ -165,25 +167,78 @@ void MovingTracks::add(const Matches& matches, const std::vector<char>& moving_m
   }
 }
 
+std::vector<char> MovingTracks::members(const Matches& matches) const {
+  std::vector<char> mask(matches.track_ids.size());
+  std::ranges::transform(matches.track_ids, mask.begin(), [&](int track_id) {
+    return static_cast<char>(evidence_.contains(track_id));
+  });
+  return mask;
+}
+
+std::vector<char> MovingTracks::flags(const Matches& matches,
+                                      const std::map<int, Eigen::Vector3d>& landmarks) const {
+  const std::vector<char> moving = members(matches);
+  const std::vector<Eigen::Vector2d> things = select(matches.cur_uv, moving);
+  std::vector<char> mask = moving;
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    const auto is_beside = [&](const Eigen::Vector2d& of_thing) {
+      return (of_thing - matches.cur_uv[i]).norm() < border_px_;
+    };
+    if (mask[i] == 0 && !landmarks.contains(matches.track_ids[i])) {
+      mask[i] = static_cast<char>(std::ranges::any_of(things, is_beside));
+    }
+  }
+  return mask;
+}
+
+std::optional<std::vector<char>> MovingTracks::move_as_one(const Matches& matches,
+                                                           const std::vector<char>& some) const {
+  const std::optional<Eigen::Matrix3d> motion = estimate_homography(
+      {select(matches.prev_uv, some), select(matches.cur_uv, some)}, options_, seed_);
+  if (!motion.has_value()) {
+    return std::nullopt;
+  }
+  return score_homography(*motion, {matches.prev_uv, matches.cur_uv}, options_.inlier_threshold_px)
+      .inlier_mask;
+}
+
+void MovingTracks::find(const Matches& matches, const std::vector<char>& fits_pose) {
+  const int num_apart = std::exchange(num_apart_, 0);
+  const std::vector<char> all(matches.cur_uv.size(), 1);
+  const std::vector<char> rest = without(members(matches), without(fits_pose, all));
+  const auto may_mislead = [&](const std::vector<char>& some) {
+    return cell_votes(matches.cur_uv, some) >= kMinParty * cell_votes(matches.cur_uv, all);
+  };
+  if (!may_mislead(rest)) {
+    return;
+  }
+  if (const auto as_one = move_as_one(matches, rest)) {
+    const std::vector<char> thing = without(without(*as_one, all), rest);
+    num_apart_ = may_mislead(thing) ? num_apart + 1 : 0;
+    if (num_apart_ >= kMinApart) {
+      add(matches, thing);
+    }
+  }
+}
+
 void MovingTracks::observe(const Matches& matches, const std::vector<char>& fits_world) {
   if (empty()) {
     return;
   }
-  const std::vector<char> moving = flags(matches);
-  const std::optional<Eigen::Matrix3d> motion = estimate_homography(
-      {select(matches.prev_uv, moving), select(matches.cur_uv, moving)}, options_, seed_);
+  const std::vector<char> moving = members(matches);
+  const std::optional<std::vector<char>> fits_thing = move_as_one(matches, moving);
   std::map<int, int> before = std::exchange(evidence_, {});
-  if (!motion.has_value()) {
+  if (!fits_thing.has_value()) {
     return;
   }
-  const std::vector<char> fits_thing =
-      score_homography(*motion, {matches.prev_uv, matches.cur_uv}, options_.inlier_threshold_px)
-          .inlier_mask;
+  const std::vector<char> world = without(moving, fits_world);
+  const auto num_world = std::ranges::count(world, char{1});
+  const bool is_apart = 2 * std::ranges::count(without(*fits_thing, world), char{1}) >= num_world;
   const Cells cells(matches.cur_uv, moving);
   for (std::size_t i = 0; i < moving.size(); ++i) {
-    const int vote = (fits_thing[i] != 0 ? 1 : 0) - (fits_world[i] != 0 ? 1 : 0);
-    const bool joins =
-        fits_thing[i] != 0 && (fits_world[i] == 0 || cells.of_point[i]->share() > 0.5);
+    const bool fits = (*fits_thing)[i] != 0;
+    const int vote = (fits ? 1 : 0) - (fits_world[i] != 0 ? 1 : 0);
+    const bool joins = is_apart && fits && (fits_world[i] == 0 || cells.of_point[i]->share() > 0.5);
     const int evidence = moving[i] != 0
                              ? std::min(before[matches.track_ids[i]] + vote, kMostEvidence)
                              : (joins ? kFirstEvidence : 0);

@@ -56,28 +56,41 @@ struct MotionRivals {
 /// that no new corner of the same thing takes their place each frame.
 class MovingTracks {
  public:
-  explicit MovingTracks(const Options& config) : options_(config.two_view), seed_(config.seed) {}
+  explicit MovingTracks(const Options& config)
+      : options_(config.two_view),
+        seed_(config.seed),
+        border_px_(2.0 * config.features.min_distance_px) {}
 
-  void clear() { evidence_.clear(); }
+  void clear() {
+    evidence_.clear();
+    num_apart_ = 0;
+  }
   /// `moving_mask`, one per match: these move as a thing does.
   void add(const Matches& matches, const std::vector<char>& moving_mask);
+  /// A localized frame. What does not fit its pose is a thing where it is so much of the image that
+  /// it may mislead, and moves as one, in two frames one after the other. `fits_pose`: one per
+  /// match.
+  void find(const Matches& matches, const std::vector<char>& fits_pose);
   /// A localized frame: tracks join that move as the things do, those leave that move as the world
-  /// does. `fits_world`: one per match.
+  /// does; where both move alike, none does. `fits_world`: one per match.
   void observe(const Matches& matches, const std::vector<char>& fits_world);
 
   [[nodiscard]] bool empty() const { return evidence_.empty(); }
-  /// One per match.
-  [[nodiscard]] std::vector<char> flags(const Matches& matches) const {
-    std::vector<char> mask(matches.track_ids.size());
-    std::ranges::transform(matches.track_ids, mask.begin(), [&](int track_id) {
-      return static_cast<char>(evidence_.contains(track_id));
-    });
-    return mask;
-  }
+  /// One per match: tracks of things, and those beside one that are no landmarks. The patch of a
+  /// corner at a thing's edge moves with both, and would be a landmark at a depth where nothing is.
+  [[nodiscard]] std::vector<char> flags(const Matches& matches,
+                                        const std::map<int, Eigen::Vector3d>& landmarks) const;
 
  private:
+  [[nodiscard]] std::vector<char> members(const Matches& matches) const;
+  /// Those of some matches that move as a plane does, one per match of all.
+  [[nodiscard]] std::optional<std::vector<char>> move_as_one(const Matches& matches,
+                                                             const std::vector<char>& some) const;
+
   TwoViewOptions options_;
   std::uint64_t seed_;
+  double border_px_;
+  int num_apart_ = 0;            ///< frames, the last ones, in which a new thing moved
   std::map<int, int> evidence_;  ///< by track id: frames for a thing less those for the world
 };
 

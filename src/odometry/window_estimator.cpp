@@ -59,7 +59,8 @@ LocalizedFrame WindowEstimator::localize(const Frame& frame) {
   LocalizedFrame localized;
   FrameResult& result = localized.result;
   std::vector<char>& mask = localized.inlier_mask;
-  mask = without(moving_.flags(frame.matches), std::vector<char>(frame.matches.cur_uv.size(), 1));
+  mask = without(moving_.flags(frame.matches, window_.landmarks),
+                 std::vector<char>(frame.matches.cur_uv.size(), 1));
   result.state = find_pose(frame, localized);
   was_static_ = frame.has_image() ? result.state != FrameState::kTracking : was_static_;
   result.num_matches = static_cast<int>(mask.size());
@@ -135,11 +136,14 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
   is_initializing_ = false;
   const Rigid3 before = std::exchange(world_from_camera_, found);
   mark_outliers(frame.matches, localization_.inlier_bound_px, localized.inlier_mask);
+  if (is_last_localized_) {
+    moving_.find(frame.matches, localized.inlier_mask);
+  }
   if (!moving_.empty()) {  // tracks of things that move on their own go on, and are no inliers
     std::vector<char> fits_world(frame.matches.cur_uv.size(), 1);
     mark_outliers(frame.matches, kAgrees_px, fits_world);
     moving_.observe(frame.matches, fits_world);
-    localized.moving_mask = moving_.flags(frame.matches);
+    localized.moving_mask = moving_.flags(frame.matches, window_.landmarks);
     localized.inlier_mask = without(localized.moving_mask, localized.inlier_mask);
   }
   Observations now = current_points(frame.matches, localized.inlier_mask);
@@ -363,7 +367,8 @@ void WindowEstimator::leave(std::size_t leaving, const Keyframe& coming) {
 
 void WindowEstimator::add_keyframe(const Frame& frame) {
   append({frame.number, world_from_camera_, view_.points});
-  drop_landmarks(window_, select(frame.matches.track_ids, moving_.flags(frame.matches)));
+  drop_landmarks(window_,
+                 select(frame.matches.track_ids, moving_.flags(frame.matches, window_.landmarks)));
   triangulate_landmarks(window_, camera(), window_options_);
   if (refine_every_ > 0 && ++keyframes_since_refinement_ >= refine_every_) {
     keyframes_since_refinement_ = 0;

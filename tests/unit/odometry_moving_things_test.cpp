@@ -202,9 +202,62 @@ TEST(MovingTracks, TracksJoinAThingAndLeaveIt) {
   for (int frame = 1; frame <= 4; ++frame) {
     moving.observe(flock(frame, 3.0), fits_world);
   }
-  const std::vector<char> flags = moving.flags(matches);
+  const std::vector<char> flags = moving.flags(matches, {});
   EXPECT_EQ(std::count(flags.begin(), flags.begin() + kFlock, char{1}), kFlock);
   EXPECT_EQ(std::count(flags.begin() + kFlock, flags.end(), char{1}), 0);
+}
+
+TEST(MovingTracks, WhatMovesApartFromThePoseTwiceIsAThing) {
+  constexpr std::size_t kFlock = 40;
+  MovingTracks moving{Options()};
+  Matches matches = flock(1, 3.0);
+  std::vector<char> fits_pose(matches.track_ids.size(), 1);
+  std::fill(fits_pose.begin(), fits_pose.begin() + kFlock, char{0});
+  moving.find(matches, fits_pose);
+  EXPECT_TRUE(moving.empty());
+  moving.find(flock(2, 3.0), fits_pose);
+  const std::vector<char> flags = moving.flags(matches, {});
+  EXPECT_EQ(std::count(flags.begin(), flags.begin() + kFlock, char{1}), kFlock);
+  EXPECT_EQ(std::count(flags.begin() + kFlock, flags.end(), char{1}), 0);
+
+  MovingTracks scattered{Options()};
+  SceneRandom random(3);
+  for (std::size_t i = 0; i < kFlock; ++i) {  // wrong matches are no thing
+    matches.cur_uv[i] += Eigen::Vector2d(random.uniform(-20.0, 20.0), random.uniform(-20.0, 20.0));
+  }
+  for (int frame = 0; frame < 5; ++frame) {
+    scattered.find(matches, fits_pose);
+  }
+  EXPECT_TRUE(scattered.empty());
+}
+
+TEST(MovingTracks, CornersBesideAThingAreNotTakenForLandmarks) {
+  MovingTracks moving{Options()};
+  Matches matches;
+  for (int i = 0; i < 4; ++i) {
+    matches.track_ids.push_back(i);
+    matches.cur_uv.emplace_back(100.0 + 12.0 * i, 100.0);
+  }
+  moving.add(matches, {1, 0, 0, 0});
+  EXPECT_EQ(moving.flags(matches, {}), std::vector<char>({1, 1, 0, 0}));
+  EXPECT_EQ(moving.flags(matches, {{1, Eigen::Vector3d::UnitZ()}}),
+            std::vector<char>({1, 0, 0, 0}));
+}
+
+TEST(MovingTracks, NoneJoinsAThingThatStandsAsTheWorldDoes) {
+  constexpr std::size_t kFlock = 40;
+  MovingTracks moving{Options()};
+  Matches matches = flock(1, 0.0);
+  std::vector<char> named(matches.track_ids.size(), 0);
+  std::fill(named.begin(), named.begin() + kFlock, char{1});
+  moving.add(matches, named);
+  matches.track_ids.push_back(200);  // of the world, seen between the thing's
+  matches.prev_uv.push_back(matches.prev_uv.front());
+  matches.cur_uv.push_back(matches.cur_uv.front());
+  for (int frame = 0; frame < 3; ++frame) {
+    moving.observe(matches, std::vector<char>(matches.track_ids.size(), 1));
+  }
+  EXPECT_EQ(moving.flags(matches, {{200, Eigen::Vector3d::UnitZ()}}).back(), 0);
 }
 
 }  // namespace
