@@ -97,9 +97,7 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   }
   const SeenLandmarks seen = find_seen_landmarks(window_, now);
   Rigid3 start = predict();
-  // An image that is missing before this one: its turn is of more than one frame.
-  const auto image_turn = last_.frame == frame.number - 1 ? frame.image_turn : std::nullopt;
-  for (const auto& turn : {frame.hints.prev_from_cur, image_turn}) {
+  for (const auto& turn : {frame.hints.prev_from_cur, image_turn(frame)}) {
     start = turn ? nearer_pose(start, predict(turn), seen, camera()) : start;
   }
   const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);

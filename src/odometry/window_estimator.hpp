@@ -121,8 +121,15 @@ class WindowEstimator final : public Estimator {
                             const SeenLandmarks& seen,
                             double parallax,
                             const std::optional<double>& still_px);
-  /// Nothing is measured: the last motion goes on.
-  void go_on(const Frame& frame) { world_from_camera_ = predict(trust_.trusted(frame.hints)); }
+  /// The turn since the frame before, where the images as a whole tell it.
+  [[nodiscard]] std::optional<Eigen::Quaterniond> image_turn(const Frame& frame) const {
+    return last_.frame == frame.number - 1 ? frame.image_turn : std::nullopt;
+  }
+  /// Nothing is measured: the last motion goes on, with the turn that anything tells.
+  void go_on(const Frame& frame) {
+    const std::optional<Eigen::Quaterniond> hint = trust_.trusted(frame.hints);
+    world_from_camera_ = predict(hint ? hint : image_turn(frame));
+  }
   /// Goes on in the map where the frame shows a kept place; false: it shows none.
   [[nodiscard]] Rigid3 pose_by_reference(const Matches& matches,
                                          const std::map<int, Eigen::Vector3d>& in_camera,

@@ -44,6 +44,7 @@ class EstimatorRun {
     frame.image = image;
     frame.road = road ? road(i) : nullptr;
     frame.pyramid = pyramid ? pyramid(i) : nullptr;
+    frame.image_turn = image_turn;
     frame.matches = std::move(matches);
     frame.matches.prev_frame = last_number_;
     const std::vector<int> points = frame.matches.track_ids;
@@ -78,6 +79,7 @@ class EstimatorRun {
   double interval_s = 0.1;                                    ///< before the next frame
   FrameHints hints;                                           ///< of the next frame alone
   cv::Mat image;                                              ///< of the next frame
+  std::optional<Eigen::Quaterniond> image_turn;               ///< likewise
   std::function<std::shared_ptr<const RoadImage>(int)> road;  ///< of the drive's frames, or none
   std::function<std::shared_ptr<ImagePyramid>(int)> pyramid;  ///< likewise
   std::vector<FrameResult> results;

@@ -282,6 +282,17 @@ TEST(WindowRecovery, TracksThatEndAnywhereAreLostAndTheOldMapServesAgain) {
   d.expect_true_step(kBadFrame - 1, kBadFrame);
 }
 
+TEST(WindowRecovery, TheImageAsAWholeTurnsACameraThatIsLost) {
+  WellDriven d;
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY()));
+  d.run.image_turn = turn;
+  EXPECT_EQ(d.run.add_matches({}, kBadFrame).state, FrameState::kLost);
+  const std::vector<Rigid3>& poses = d.estimator.trajectory();
+  const Rigid3 step = poses.end()[-2].inverse() * poses.back();
+  EXPECT_LT(step.rotation.angularDistance(turn), 1e-9);
+  EXPECT_GT(step.translation.norm(), 0.0);
+}
+
 TEST(WindowRecovery, StandingStillAfterALossDoesNotLengthenTheUnit) {
   WellDriven d;
   EXPECT_EQ(d.run.add_matches({}, kBadFrame).state, FrameState::kLost);
