@@ -102,8 +102,11 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   }
   const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
   // What passes hides the landmarks: more tracks stand than landmarks are left for another pose.
-  if (!still_px &&
-      num_standing(frame, now) > std::max(found ? found->num_inliers : 0, options_.min_inliers)) {
+  const int num_found = found ? found->num_inliers : 0;
+  if (!still_px && num_standing(frame, now) > std::max(num_found, options_.min_inliers)) {
+    if (num_found < options_.min_inliers && frame.time_s - view_.time_s < kHidden_s) {
+      stand_ = {frame.number, now, stand_.keyframe};  // it hides tracks of the stand, too
+    }
     return FrameState::kStationary;
   }
   if (found.has_value()) {
