@@ -100,7 +100,7 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   for (const auto& turn : {frame.hints.prev_from_cur, image_turn(frame)}) {
     start = turn ? nearer_pose(start, predict(turn), seen, camera()) : start;
   }
-  const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
+  std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
   // What passes hides the landmarks: more tracks stand than landmarks are left for another pose.
   const int num_found = found ? found->num_inliers : 0;
   if (!still_px && num_standing(frame, now) > std::max(num_found, options_.min_inliers)) {
@@ -108,6 +108,11 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
       stand_ = {frame.number, now, stand_.keyframe};  // it hides tracks of the stand, too
     }
     return FrameState::kStationary;
+  }
+  if (found && is_map_of_thing(found->world_from_camera, frame.matches, localized.inlier_mask)) {
+    close_window();
+    stood_ = false;
+    found.reset();
   }
   if (found.has_value()) {
     const Rigid3 of_world =
@@ -293,8 +298,7 @@ bool WindowEstimator::open_window(const View& view) {
   if (!window.has_value()) {
     return false;
   }
-  mapper_.close(window_view());
-  history_.close(window_);
+  close_window();
   window_ = std::move(*window);
   map_ids_.begin();
   const bool has_road = reference.road != nullptr || !scale_.asks_road();
@@ -302,8 +306,15 @@ bool WindowEstimator::open_window(const View& view) {
   scale_.restart(road_view.road.get(), road_view.time_s);
   calibration_.restart();
   road_pose_ = road_view.world_from_camera;
-  stand_ = {};
   return true;
+}
+
+void WindowEstimator::close_window() {
+  mapper_.close(window_view());
+  history_.close(window_);
+  window_ = {};
+  stand_ = {};
+  num_taken_ = 0;
 }
 
 double WindowEstimator::min_flow_px() const {

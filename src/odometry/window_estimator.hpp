@@ -112,11 +112,11 @@ class WindowEstimator final : public Estimator {
                                                              const Rigid3& found,
                                                              const Matches& matches,
                                                              std::vector<char>& thing) const;
-  /// By the matches since the last frame, where the pose found fits too little of the image.
-  [[nodiscard]] std::optional<Localization> localize_by_rest(const Rigid3& found,
-                                                             const Matches& matches,
-                                                             const std::vector<char>& mask,
-                                                             std::vector<char>& thing) const;
+  /// The pose found is that before a thing which moves on its own: for some frames it has fitted
+  /// that alone, and another motion the rest of the image.
+  [[nodiscard]] bool is_map_of_thing(const Rigid3& found,
+                                     const Matches& matches,
+                                     const std::vector<char>& mask);
   void fuse_with_prediction(const Rigid3& before,
                             const SeenLandmarks& seen,
                             double parallax,
@@ -162,6 +162,7 @@ class WindowEstimator final : public Estimator {
   }
   void reset_reference(View reference);
   [[nodiscard]] bool open_window(const View& view);
+  void close_window();
   [[nodiscard]] WindowView window_view() const {
     return {window_,     history_, camera(),      radials_,
             trajectory_, times_s_, metric_sigma_, view_.frame};
@@ -231,6 +232,7 @@ class WindowEstimator final : public Estimator {
   std::optional<double> metric_sigma_;  ///< of the last frame's scale, where that is in metres
   std::optional<Similarity3> moved_;    ///< the world, on the frame in work: new from old
   int recognized_frame_ = -1;           ///< by the frame in work
+  int num_taken_ = 0;                   ///< frames, the last ones, whose map seems a thing's
   double still_s_ = 0.0;                ///< since the initializer's reference: as far as it stood
   int keyframes_since_refinement_ = 0;
 };

@@ -56,12 +56,9 @@ bool WindowEstimator::relocate(const Frame& frame,
     return false;
   }
   recognized_frame_ = found->frame;
-  mapper_.close(window_view());
+  close_window();
   mapper_.begin_at_relocation();
-  history_.close(window_);
-  stand_ = {};
   map_ids_.go_back_to(found->frame);
-  window_ = {};
   window_.keyframes.push_back({frame.number, found->world_from_camera, now});
   fix_landmarks(window_, camera(), found->landmarks, window_options_.max_reprojection_error_px);
   scale_.restart(frame.road.get(), frame.time_s, true);

@@ -13,24 +13,21 @@
 namespace stemvo {
 
 // A thing that came before the camera after the map was opened. As long as it keeps its distance
-// its points are landmarks at infinity, and those hold the camera's rotation when it turns.
+// its points are landmarks at infinity, and those hold the camera's rotation when it turns; where
+// they have taken the map along, it ends.
 
 namespace {
 
-/// A pose of the world fits most of the image's cells so well; that of a thing, which the rest
-/// only nearly fits, does not.
+/// A motion between two images fits the cells whose matches are so near their epipolar lines.
 constexpr double kFits_px = 0.7;
+/// A map is a thing's where its pose fits less than this share of the image ..
 constexpr double kMinFitting = 0.7;
-/// A thing of so much of the image moves on its own: the other motion fits it hardly, the rest of
-/// the image well, and more of all than the pose does. Smaller ones are outvoted; and what bends
-/// with a rolling shutter is no thing.
-constexpr double kMinThing = 0.3;
-constexpr double kMaxOfThing = 0.2;
+/// .. this much of the thing, and of the rest half of what another motion fits, which fits so much
+/// of it and of the thing no more than half; and that in so many frames.
+constexpr double kMinOfThing = 0.9;
 constexpr double kMinOfRest = 0.6;
-constexpr double kMinGain = 1.05;
-/// Where the camera hardly turns, a thing that keeps its distance does no harm, and who brakes
-/// before crossing cars is not made to move with them.
-constexpr double kMinTurn_px = 2.0;
+constexpr double kHalf = 0.5;
+constexpr int kTaken = 3;
 
 /// A landmark is near that the window sees under more than this.
 constexpr double kNear_rad = 1.5 * std::numbers::pi / 180.0;
@@ -71,30 +68,29 @@ double WindowEstimator::share_that_fits(const Rigid3& cur_from_last,
   return cell_votes(cur, fits) / cell_votes(cur, std::vector<char>(fits.size(), 1));
 }
 
-std::optional<Localization> WindowEstimator::localize_by_rest(const Rigid3& found,
-                                                              const Matches& matches,
-                                                              const std::vector<char>& mask,
-                                                              std::vector<char>& thing) const {
-  const double fitting = share_that_fits(found.inverse() * last_.world_from_camera, matches, mask);
-  if (fitting > kMinFitting) {
-    return std::nullopt;
+bool WindowEstimator::is_map_of_thing(const Rigid3& found,
+                                      const Matches& matches,
+                                      const std::vector<char>& mask) {
+  const Rigid3 cur_from_last = found.inverse() * last_.world_from_camera;
+  if (!is_last_localized_ || matches.prev_frame != last_.frame ||
+      share_that_fits(cur_from_last, matches, mask) > kMinFitting) {
+    num_taken_ = 0;
+    return false;
   }
-  const MeasuredMotion motion = initializer_.measure_world(
+  const MeasuredMotion other = initializer_.measure_world(
       {select(matches.prev_uv, mask), select(matches.cur_uv, mask)}, camera());
-  thing = scatter(motion.moving_mask, mask);
-  const std::vector<char> rest = without(thing, mask);
-  const auto fits = [&](const std::vector<char>& party) {
-    return share_that_fits(motion.cur_from_prev, matches, party);
-  };
-  const double turn_px = camera().mean_focal_px() * motion.cur_from_prev.angle_rad();
-  const double size = cell_votes(matches.cur_uv, thing) / cell_votes(matches.cur_uv, mask);
-  if (turn_px < kMinTurn_px || size < kMinThing || fits(thing) > kMaxOfThing ||
-      fits(rest) < kMinOfRest || fits(mask) < kMinGain * fitting) {
-    return std::nullopt;
+  const std::vector<char> thing = scatter(other.moving_mask, mask);
+  if (std::ranges::count(thing, char{1}) == 0) {  // two motions were not told apart
+    return false;
   }
-  return stemvo::localize(find_seen_landmarks(window_, current_points(matches, rest)),
-                          predict(motion.cur_from_prev.rotation.conjugate()), camera(),
-                          localization_);
+  const std::vector<char> rest = without(thing, mask);
+  const double of_rest = share_that_fits(other.cur_from_prev, matches, rest);
+  const bool is_taken = of_rest > kMinOfRest &&
+                        share_that_fits(cur_from_last, matches, thing) > kMinOfThing &&
+                        share_that_fits(cur_from_last, matches, rest) < kHalf * of_rest &&
+                        share_that_fits(other.cur_from_prev, matches, thing) < kHalf;
+  num_taken_ = is_taken ? num_taken_ + 1 : 0;
+  return num_taken_ >= kTaken;
 }
 
 std::optional<Localization> WindowEstimator::localize_by_near(const SeenLandmarks& seen,
@@ -146,10 +142,7 @@ Rigid3 WindowEstimator::pose_without_thing(const Frame& frame,
                                            std::vector<char>& mask) {
   const Matches& matches = frame.matches;
   std::vector<char> thing(mask.size());
-  std::optional<Localization> world = localize_by_near(seen, found, matches, thing);
-  if (!world.has_value() && is_last_localized_ && matches.prev_frame == last_.frame) {
-    world = localize_by_rest(found, matches, mask, thing);
-  }
+  const std::optional<Localization> world = localize_by_near(seen, found, matches, thing);
   if (!world.has_value()) {
     return found;
   }
