@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/moving_things.hpp"
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <utility>

@@ -100,19 +100,18 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   for (const auto& turn : {frame.hints.prev_from_cur, image_turn(frame)}) {
     start = turn ? nearer_pose(start, predict(turn), seen, camera()) : start;
   }
-  std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
+  const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
   // What passes hides the landmarks: more tracks stand than landmarks are left for another pose.
   const int num_found = found ? found->num_inliers : 0;
   if (!still_px && num_standing(frame, now) > std::max(num_found, options_.min_inliers)) {
     if (num_found < options_.min_inliers && frame.time_s - view_.time_s < kHidden_s) {
-      stand_ = {frame.number, now, stand_.keyframe};  // it hides tracks of the stand, too
+      renew_stand_behind(frame, now);
     }
     return FrameState::kStationary;
   }
-  if (found && is_map_of_thing(found->world_from_camera, frame.matches, localized.inlier_mask)) {
-    close_window();
-    stood_ = false;
-    found.reset();
+  if (found && !still_px &&
+      is_map_of_thing(found->world_from_camera, frame.matches, localized.inlier_mask)) {
+    return begin_anew(frame, localized);
   }
   if (found.has_value()) {
     const Rigid3 of_world =
@@ -142,7 +141,7 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
   is_initializing_ = false;
   const Rigid3 before = std::exchange(world_from_camera_, found);
   mark_outliers(frame.matches, localization_.inlier_bound_px, localized.inlier_mask);
-  if (is_last_localized_) {
+  if (is_since_last(frame.matches) && num_taken_ == 0) {  // else the world were the thing
     moving_.find(frame.matches, localized.inlier_mask);
   }
   if (!moving_.empty()) {  // tracks of things that move on their own go on, and are no inliers
@@ -189,7 +188,7 @@ void WindowEstimator::mark_outliers(const Matches& matches,
                                     double bound_px,
                                     std::vector<char>& mask) const {
   const Rigid3 camera_from_world = world_from_camera_.inverse();
-  if (is_last_localized_ && matches.prev_frame == last_.frame) {
+  if (is_since_last(matches)) {
     mask = epipolar_inliers(camera_from_world * last_.world_from_camera,
                             {matches.prev_uv, matches.cur_uv}, camera(), bound_px);
   }
@@ -199,6 +198,17 @@ void WindowEstimator::mark_outliers(const Matches& matches,
       mask[i] = is_near(camera_from_world, landmark->second, matches.cur_uv[i], camera(), bound_px);
     }
   }
+}
+
+/// The map is of a thing: the world gets one of its own.
+FrameState WindowEstimator::begin_anew(const Frame& frame, LocalizedFrame& localized) {
+  close_window();
+  motion_.restart();
+  stood_ = false;
+  reset_reference({last_.frame, last_.world_from_camera, {}, last_.time_s, last_.road});
+  std::vector<char>& mask = localized.inlier_mask;
+  mask.assign(mask.size(), 1);
+  return measure_since_reference(frame, current_points(frame.matches, mask), localized);
 }
 
 /// There are no landmarks yet, they are out of view, or the frame shows another scene.
@@ -269,12 +279,12 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
   }
   // Until there is a first map, the position is held; later the camera goes on as it was seen to.
   const bool is_still = motion.state == FrameState::kStationary ||
-                        (motion.state == FrameState::kRotating && window_.keyframes.empty());
+                        (motion.state == FrameState::kRotating && !has_had_map());
   double moving_s = is_still ? 0.0 : interval_s_;
   Eigen::Vector3d position = world_from_camera_.translation;
-  if (!window_.keyframes.empty() && is_tracking) {
+  if (has_had_map() && is_tracking) {
     position = guess.translation;
-  } else if (!window_.keyframes.empty() && !is_still) {
+  } else if (has_had_map() && !is_still) {
     position = predict().translation;
     moving_s = std::min(interval_s_, (position - world_from_camera_.translation).norm() / speed_);
   }

@@ -135,6 +135,7 @@ class WindowEstimator final : public Estimator {
                                          const std::map<int, Eigen::Vector3d>& in_camera,
                                          const Rigid3& predicted) const;
   [[nodiscard]] bool relocate(const Frame& frame, const Observations& now, const Rigid3& predicted);
+  FrameState begin_anew(const Frame& frame, LocalizedFrame& localized);
   FrameState measure_since_reference(const Frame& frame,
                                      const Observations& now,
                                      LocalizedFrame& localized);
@@ -145,6 +146,7 @@ class WindowEstimator final : public Estimator {
   // A camera that stood moves off.
   static constexpr double kHidden_s = 3.0;  ///< it is believed to stand where things hide the world
   void renew_stand(const Observations& now);
+  void renew_stand_behind(const Frame& frame, const Observations& now);
   void keep_stand();
   [[nodiscard]] int num_standing(const Frame& frame, const Observations& now) const;
   [[nodiscard]] const Keyframe* standing_keyframe(const Frame& frame,
@@ -160,6 +162,11 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] bool is_localized(const Frame& frame) const {
     return frame.has_image() && view_.frame == frame.number;
   }
+  /// Matches with the frame before, which has a pose of this map.
+  [[nodiscard]] bool is_since_last(const Matches& matches) const {
+    return is_last_localized_ && matches.prev_frame == last_.frame;
+  }
+  [[nodiscard]] bool has_had_map() const { return !history_.keyframes().empty(); }
   void reset_reference(View reference);
   [[nodiscard]] bool open_window(const View& view);
   void close_window();
@@ -232,7 +239,7 @@ class WindowEstimator final : public Estimator {
   std::optional<double> metric_sigma_;  ///< of the last frame's scale, where that is in metres
   std::optional<Similarity3> moved_;    ///< the world, on the frame in work: new from old
   int recognized_frame_ = -1;           ///< by the frame in work
-  int num_taken_ = 0;                   ///< frames, the last ones, whose map seems a thing's
+  int num_taken_ = 0;                   ///< frames in a row whose map seems a thing's
   double still_s_ = 0.0;                ///< since the initializer's reference: as far as it stood
   int keyframes_since_refinement_ = 0;
 };

@@ -105,7 +105,7 @@ void WindowEstimator::describe(const Frame& frame, FrameResult& result) {
   scale_.report(result);
   const bool is_guessed = result.state == FrameState::kInitializing ||
                           result.state == FrameState::kLowParallax ||
-                          (result.state == FrameState::kRotating && !window_.keyframes.empty());
+                          (result.state == FrameState::kRotating && has_had_map());
   result.is_measured = is_measured(result.state) && !(is_initializing_ && is_guessed);
   result.map_id = map_ids_.now();
   result.map_from_world = mapper_.map_from_world();

@@ -79,6 +79,18 @@ void WindowEstimator::renew_stand(const Observations& now) {
   }
 }
 
+/// What hides the world hides the stand's tracks one after the other: those that began meanwhile
+/// join them. The others are compared with where they were, for a camera that creeps off.
+void WindowEstimator::renew_stand_behind(const Frame& frame, const Observations& now) {
+  const auto stood = std::ranges::find(window_.keyframes, stand_.frame, &Keyframe::frame);
+  Observations points = now;
+  for (Observation& point : points) {
+    const Observation* before = find_point(stood->points, point.track_id);
+    point.uv = before != nullptr ? before->uv : point.uv;
+  }
+  stand_ = {frame.number, std::move(points), stand_.keyframe};
+}
+
 /// The tracks that began while the camera stood are in no other keyframe. One that stands again at
 /// the same place has its keyframe there anew: a window of one place would know no depth.
 void WindowEstimator::keep_stand() {

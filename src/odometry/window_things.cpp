@@ -20,10 +20,10 @@ namespace {
 
 /// A motion between two images fits the cells whose matches are so near their epipolar lines.
 constexpr double kFits_px = 0.7;
-/// A map is a thing's where its pose fits less than this share of the image ..
+/// A map is a thing's where its pose fits no more than this share of the image ..
 constexpr double kMinFitting = 0.7;
-/// .. this much of the thing, and of the rest half of what another motion fits, which fits so much
-/// of it and of the thing no more than half; and that in so many frames.
+/// .. over this much of the thing, and of the rest under half of what another motion fits, which
+/// fits over so much of it and under half of the thing; and that in so many frames.
 constexpr double kMinOfThing = 0.9;
 constexpr double kMinOfRest = 0.6;
 constexpr double kHalf = 0.5;
@@ -72,8 +72,7 @@ bool WindowEstimator::is_map_of_thing(const Rigid3& found,
                                       const Matches& matches,
                                       const std::vector<char>& mask) {
   const Rigid3 cur_from_last = found.inverse() * last_.world_from_camera;
-  if (!is_last_localized_ || matches.prev_frame != last_.frame ||
-      share_that_fits(cur_from_last, matches, mask) > kMinFitting) {
+  if (!is_since_last(matches) || share_that_fits(cur_from_last, matches, mask) > kMinFitting) {
     num_taken_ = 0;
     return false;
   }
