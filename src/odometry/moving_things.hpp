@@ -75,13 +75,14 @@ class MovingTracks {
   void observe(const Matches& matches, const std::vector<char>& fits_world);
 
   [[nodiscard]] bool empty() const { return evidence_.empty(); }
-  /// One per match: tracks of things, and those beside one that are no landmarks. The patch of a
+  /// One per match: tracks of things.
+  [[nodiscard]] std::vector<char> members(const Matches& matches) const;
+  /// One per match: these, and those beside one that are no landmarks. The patch of a
   /// corner at a thing's edge moves with both, and would be a landmark at a depth where nothing is.
   [[nodiscard]] std::vector<char> flags(const Matches& matches,
                                         const std::map<int, Eigen::Vector3d>& landmarks) const;
 
  private:
-  [[nodiscard]] std::vector<char> members(const Matches& matches) const;
   /// Those of some matches that move as a plane does, one per match of all.
   [[nodiscard]] std::optional<std::vector<char>> move_as_one(const Matches& matches,
                                                              const std::vector<char>& some) const;

@@ -200,17 +200,6 @@ void WindowEstimator::mark_outliers(const Matches& matches,
   }
 }
 
-/// The map is of a thing: the world gets one of its own.
-FrameState WindowEstimator::begin_anew(const Frame& frame, LocalizedFrame& localized) {
-  close_window();
-  motion_.restart();
-  stood_ = false;
-  reset_reference({last_.frame, last_.world_from_camera, {}, last_.time_s, last_.road});
-  std::vector<char>& mask = localized.inlier_mask;
-  mask.assign(mask.size(), 1);
-  return measure_since_reference(frame, current_points(frame.matches, mask), localized);
-}
-
 /// There are no landmarks yet, they are out of view, or the frame shows another scene.
 FrameState WindowEstimator::measure_since_reference(const Frame& frame,
                                                     const Observations& now,
@@ -319,14 +308,6 @@ bool WindowEstimator::open_window(const View& view) {
   return true;
 }
 
-void WindowEstimator::close_window() {
-  mapper_.close(window_view());
-  history_.close(window_);
-  window_ = {};
-  stand_ = {};
-  num_taken_ = 0;
-}
-
 double WindowEstimator::min_flow_px() const {
   return (was_static_ ? kHysteresis : 1.0) * options_.stationary_flow_px;
 }
@@ -389,8 +370,7 @@ void WindowEstimator::leave(std::size_t leaving, const Keyframe& coming) {
 
 void WindowEstimator::add_keyframe(const Frame& frame) {
   append({frame.number, world_from_camera_, view_.points});
-  drop_landmarks(window_,
-                 select(frame.matches.track_ids, moving_.flags(frame.matches, window_.landmarks)));
+  drop_landmarks(window_, select(frame.matches.track_ids, moving_.members(frame.matches)));
   triangulate_landmarks(window_, camera(), window_options_);
   if (refine_every_ > 0 && ++keyframes_since_refinement_ >= refine_every_) {
     keyframes_since_refinement_ = 0;

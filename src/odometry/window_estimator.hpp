@@ -145,6 +145,7 @@ class WindowEstimator final : public Estimator {
 
   // A camera that stood moves off.
   static constexpr double kHidden_s = 3.0;  ///< it is believed to stand where things hide the world
+  [[nodiscard]] const Keyframe* stand_keyframe() const;
   void renew_stand(const Observations& now);
   void renew_stand_behind(const Frame& frame, const Observations& now);
   void keep_stand();

@@ -42,6 +42,14 @@ Rigid3 WindowEstimator::pose_by_reference(const Matches& matches,
              : predicted;
 }
 
+void WindowEstimator::close_window() {
+  mapper_.close(window_view());
+  history_.close(window_);
+  window_ = {};
+  stand_ = {};
+  num_taken_ = 0;
+}
+
 bool WindowEstimator::relocate(const Frame& frame,
                                const Observations& now,
                                const Rigid3& predicted) {

@@ -71,6 +71,12 @@ std::optional<double> most_likely(std::vector<ToldLength> lengths) {
 
 }  // namespace
 
+/// Null: no keyframe is of the stand.
+const Keyframe* WindowEstimator::stand_keyframe() const {
+  const auto stood = std::ranges::find(window_.keyframes, stand_.frame, &Keyframe::frame);
+  return stood != window_.keyframes.end() ? &*stood : nullptr;
+}
+
 /// Who passes has hidden what was seen when the stand began: what was seen last takes its place.
 void WindowEstimator::renew_stand(const Observations& now) {
   if (stood_ && !stand_.points.empty() &&
@@ -82,7 +88,7 @@ void WindowEstimator::renew_stand(const Observations& now) {
 /// What hides the world hides the stand's tracks one after the other: those that began meanwhile
 /// join them. The others are compared with where they were, for a camera that creeps off.
 void WindowEstimator::renew_stand_behind(const Frame& frame, const Observations& now) {
-  const auto stood = std::ranges::find(window_.keyframes, stand_.frame, &Keyframe::frame);
+  const Keyframe* stood = stand_keyframe();
   Observations points = now;
   for (Observation& point : points) {
     const Observation* before = find_point(stood->points, point.track_id);
@@ -109,8 +115,8 @@ void WindowEstimator::keep_stand() {
 
 /// Tracks that are where the stand's keyframe has them.
 int WindowEstimator::num_standing(const Frame& frame, const Observations& now) const {
-  const auto stood = std::ranges::find(window_.keyframes, stand_.frame, &Keyframe::frame);
-  if (!stood_ || is_initializing_ || stood == window_.keyframes.end() ||
+  const Keyframe* stood = stand_keyframe();
+  if (!stood_ || is_initializing_ || stood == nullptr ||
       frame.time_s - times_s_[slot(stood->frame)] > kHidden_s) {
     return 0;
   }
@@ -123,12 +129,11 @@ int WindowEstimator::num_standing(const Frame& frame, const Observations& now) c
 /// Null: the frame is not to be measured against one.
 const Keyframe* WindowEstimator::standing_keyframe(const Frame& frame,
                                                    const Observations& now) const {
-  const auto stood = std::ranges::find(window_.keyframes, stand_.frame, &Keyframe::frame);
-  const bool is_one = stood != window_.keyframes.end() &&
-                      frame.time_s - times_s_[slot(stood->frame)] < kHidden_s &&
+  const Keyframe* stood = stand_keyframe();
+  const bool is_one = stood != nullptr && frame.time_s - times_s_[slot(stood->frame)] < kHidden_s &&
                       find_seen_landmarks(window_, now).size() >= kMinLandmarks &&
                       common_points(stood->points, now).cur_uv.size() >= kMinTracks;
-  return is_one ? &*stood : nullptr;
+  return is_one ? stood : nullptr;
 }
 
 /// Nullopt: the reference is no stand, or nothing tells how long the way is.

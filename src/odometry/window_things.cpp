@@ -92,6 +92,17 @@ bool WindowEstimator::is_map_of_thing(const Rigid3& found,
   return num_taken_ >= kTaken;
 }
 
+/// The map is of a thing: the world gets one of its own.
+FrameState WindowEstimator::begin_anew(const Frame& frame, LocalizedFrame& localized) {
+  close_window();
+  motion_.restart();
+  stood_ = false;
+  reset_reference({last_.frame, last_.world_from_camera, {}, last_.time_s, last_.road});
+  std::vector<char>& mask = localized.inlier_mask;
+  mask.assign(mask.size(), 1);
+  return measure_since_reference(frame, current_points(frame.matches, mask), localized);
+}
+
 std::optional<Localization> WindowEstimator::localize_by_near(const SeenLandmarks& seen,
                                                               const Rigid3& found,
                                                               const Matches& matches,

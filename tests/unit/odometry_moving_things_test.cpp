@@ -169,11 +169,13 @@ TEST(StandingCamera, StaysWhileOthersPassBy) {
   EXPECT_TRUE(stationary_flow_px(before, now, 0.15, 20).has_value());
 }
 
+constexpr int kFlock = 40;
+
 /// A flock that goes right in a still world: ids 0 to 39 go, 100 to 139 stay.
 Matches flock(int frame, double px_per_frame) {
   Matches matches;
   SceneRandom random(8);
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < kFlock; ++i) {
     const Eigen::Vector2d corner(random.uniform(400.0, 600.0), random.uniform(100.0, 250.0));
     matches.track_ids.push_back(i);
     matches.prev_uv.emplace_back(corner.x() + px_per_frame * (frame - 1), corner.y());
@@ -188,37 +190,38 @@ Matches flock(int frame, double px_per_frame) {
   return matches;
 }
 
+std::vector<char> of_flock(const Matches& matches) {
+  std::vector<char> flags(matches.track_ids.size(), 0);
+  std::fill_n(flags.begin(), kFlock, char{1});
+  return flags;
+}
+std::vector<char> of_world(const Matches& matches) {
+  return without(of_flock(matches), std::vector<char>(matches.track_ids.size(), 1));
+}
+
 TEST(MovingTracks, TracksJoinAThingAndLeaveIt) {
-  constexpr std::size_t kFlock = 40;
   MovingTracks moving{Options()};
   Matches matches = flock(1, 3.0);
-  std::vector<char> fits_world(matches.track_ids.size(), 1);
-  std::fill(fits_world.begin(), fits_world.begin() + kFlock, char{0});
+  const std::vector<char> fits_world = of_world(matches);
   // One of the flock is not named at first, one of the world is.
-  std::vector<char> named(fits_world.size(), 0);
-  std::fill(named.begin() + 1, named.begin() + kFlock, char{1});
+  std::vector<char> named = of_flock(matches);
+  named.front() = 0;
   named.back() = 1;
   moving.add(matches, named);
   for (int frame = 1; frame <= 4; ++frame) {
     moving.observe(flock(frame, 3.0), fits_world);
   }
-  const std::vector<char> flags = moving.flags(matches, {});
-  EXPECT_EQ(std::count(flags.begin(), flags.begin() + kFlock, char{1}), kFlock);
-  EXPECT_EQ(std::count(flags.begin() + kFlock, flags.end(), char{1}), 0);
+  EXPECT_EQ(moving.flags(matches, {}), of_flock(matches));
 }
 
 TEST(MovingTracks, WhatMovesApartFromThePoseTwiceIsAThing) {
-  constexpr std::size_t kFlock = 40;
   MovingTracks moving{Options()};
   Matches matches = flock(1, 3.0);
-  std::vector<char> fits_pose(matches.track_ids.size(), 1);
-  std::fill(fits_pose.begin(), fits_pose.begin() + kFlock, char{0});
+  const std::vector<char> fits_pose = of_world(matches);
   moving.find(matches, fits_pose);
   EXPECT_TRUE(moving.empty());
   moving.find(flock(2, 3.0), fits_pose);
-  const std::vector<char> flags = moving.flags(matches, {});
-  EXPECT_EQ(std::count(flags.begin(), flags.begin() + kFlock, char{1}), kFlock);
-  EXPECT_EQ(std::count(flags.begin() + kFlock, flags.end(), char{1}), 0);
+  EXPECT_EQ(moving.flags(matches, {}), of_flock(matches));
 
   MovingTracks scattered{Options()};
   SceneRandom random(3);
@@ -245,12 +248,9 @@ TEST(MovingTracks, CornersBesideAThingAreNotTakenForLandmarks) {
 }
 
 TEST(MovingTracks, NoneJoinsAThingThatStandsAsTheWorldDoes) {
-  constexpr std::size_t kFlock = 40;
   MovingTracks moving{Options()};
   Matches matches = flock(1, 0.0);
-  std::vector<char> named(matches.track_ids.size(), 0);
-  std::fill(named.begin(), named.begin() + kFlock, char{1});
-  moving.add(matches, named);
+  moving.add(matches, of_flock(matches));
   matches.track_ids.push_back(200);  // of the world, seen between the thing's
   matches.prev_uv.push_back(matches.prev_uv.front());
   matches.cur_uv.push_back(matches.cur_uv.front());
